@@ -30,6 +30,7 @@ const Tag kFrameCount(0x0028, 0x0008), kPixelSpacing(0x0028, 0x0030), kPixelData
 const Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kIntercept(0x0028, 0x1052),
     kSlope(0x0028, 0x1053), kShown(0x0028, 0x0004), kBitsStored(0x0028, 0x0101), kSigned(0x0028, 0x0103),
     kHighBit(0x0028, 0x0102);
+const Tag kFloatPixels(0x7fe0, 0x0008), kDoublePixels(0x7fe0, 0x0009);  // of parametric maps alone
 const Tag kSopClass(0x0008, 0x0016), kSegmentSequence(0x0062, 0x0002), kSegmentationType(0x0062, 0x0001),
     kMostFraction(0x0062, 0x000e), kSpacingBetween(0x0018, 0x0088);
 const Tag kSharedGroups(0x5200, 0x9229), kFrameGroups(0x5200, 0x9230);
@@ -301,7 +302,9 @@ DicomContent ContentOf(const DataSet& set) {
   const std::string modality = TextOf(set, kModality), sop_class = TextOf(set, kSopClass);
   if (modality == "SEG" || sop_class == kSegmentation || sop_class == kLabelMap)
     return DicomContent::kSegments;
-  const bool other = kModalitiesOfOthers.contains(modality) || sop_class == kRtDose || sop_class == kRtImage;
+  const bool parameters = set.FindDataElement(kFloatPixels) || set.FindDataElement(kDoublePixels);
+  const bool other =
+      parameters || kModalitiesOfOthers.contains(modality) || sop_class == kRtDose || sop_class == kRtImage;
   return other ? DicomContent::kOther : DicomContent::kBody;
 }
 

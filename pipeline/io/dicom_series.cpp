@@ -86,8 +86,8 @@ std::vector<DicomFile> Meant(std::vector<DicomFile> files, DicomUse use) {
         "on, and the segmentation, saved as .nii.gz or .nrrd, as the label map of its bones");
   }
   throw InputError(
-      "the DICOM images are doses, images of a treatment or the like and no scan; give the series of an MR "
-      "or CT volume");
+      "the DICOM images are doses, parametric maps, images of a treatment or the like and no scan; give the "
+      "series of an MR or CT volume");
 }
 
 void RequireOneSegment(const std::vector<DicomFile>& series) {

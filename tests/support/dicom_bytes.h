@@ -18,6 +18,7 @@ class DicomBytes {
   }
   DicomBytes& Short(uint32_t tag, uint16_t value) { return Put(tag, "US", Little(value, 2)); }
   DicomBytes& Words(uint32_t tag, const std::string& bytes) { return PutLong(tag, "OW", bytes); }
+  DicomBytes& Floats(uint32_t tag, const std::string& bytes) { return PutLong(tag, "OF", bytes); }
   // Of packed voxels (PS3.5, A.4), behind an empty table of offsets.
   DicomBytes& Fragments(uint32_t tag, const std::vector<std::string>& fragments) {
     bytes_ += Tag(tag) + "OB" + std::string(2, '\0') + Little(0xffffffff, 4) + Tag(0xfffee000) + Little(0, 4);

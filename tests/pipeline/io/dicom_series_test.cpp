@@ -179,6 +179,19 @@ TEST(DicomSeries, ASlopeOfNothingIsRefused) {
   EXPECT_THAT(Complaint(folder.path()), HasSubstr("rescale slope of a DICOM image is 0"));
 }
 
+TEST(DicomSeries, ParametricMapsOfFloatsAreNoScan) {
+  const ScratchFolder folder;
+  for (int slice = 0; slice < 3; ++slice) {
+    const std::string name = std::to_string(slice) + ".dcm";
+    DicomBytes map = HeaderOf({.slice = slice, .modality = "MR", .series = "2.25.6"});
+    map.Floats(0x7fe00008, std::string(16, '\0')).WriteTo(folder.path() / ("map" + name));
+  }
+  EXPECT_THAT(Complaint(folder.path()), HasSubstr("parametric maps"));
+  for (int slice = 0; slice < 3; ++slice)
+    WriteCtSlice(folder.path() / (std::to_string(slice) + ".dcm"), slice, "1");
+  EXPECT_EQ(Complaint(folder.path()), "none") << "beside a scan they do not count";
+}
+
 TEST(DicomSeries, APixelSpacingIsPositive) {
   for (const char* spacing : {"-1\\1", "1\\0"}) {
     const ScratchFolder folder;

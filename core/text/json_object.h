@@ -52,6 +52,7 @@ Json ParseObject(std::string_view text, const std::string& what) {
                        " twice in one object; leave one of them");
     return true;
   };
+  if (text.empty()) throw InputError(what + " is empty; it must hold one JSON object");
   try {
     Json document = Json::parse(text, checked);
     if (document.is_object()) return document;

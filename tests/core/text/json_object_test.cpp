@@ -19,6 +19,7 @@ std::string Nested(size_t depth) {  // the object around it is one more
 TEST(JsonObject, IsWhatTheTextSays) { EXPECT_EQ(Parse(R"({"a": [1, {"b": null}]})")["a"][0], 1); }
 
 TEST(JsonObject, OtherTextsAreRefusedByNameAndPlace) {
+  EXPECT_THAT([] { Parse(""); }, ThrowsMessage<InputError>(HasSubstr("the pose is empty")));
   EXPECT_THAT([] { Parse("[1]"); }, ThrowsMessage<InputError>(HasSubstr("the pose must hold one")));
   EXPECT_THAT([] { Parse("{\"Roe\": }"); },
               ThrowsMessage<InputError>("the pose is not valid JSON (at byte 9)"));

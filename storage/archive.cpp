@@ -50,8 +50,7 @@ class LocaleOfAnyName {
 
 Reader OpenReader(const fs::path& path) {
   Reader reader(archive_read_new());
-  archive_read_support_format_zip_seekable(
-      reader.get());  // by its list at the end: without it, it is cut off
+  archive_read_support_format_zip_seekable(reader.get());  // by its list at the end: what has none is cut off
   archive_read_support_format_tar(reader.get());
   archive_read_support_filter_gzip(reader.get());
   if (archive_read_open_filename(reader.get(), path.c_str(), 1 << 16) != ARCHIVE_OK)

@@ -156,8 +156,7 @@ Rescale RescaleOf(FrameTags& tags, size_t frame) {
   if (slope == 0) {
     throw InputError(
         "the rescale slope of a DICOM image is 0, which leaves nothing of its greys; export the images "
-        "again, "
-        "or convert them to NIfTI");
+        "again or convert them to NIfTI");
   }
   return {slope, FactorOf(tags.Text(frame, kPixelValues, kIntercept), 0.0)};
 }

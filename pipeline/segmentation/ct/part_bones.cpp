@@ -1,6 +1,6 @@
 // A voxel is likelier a bone's whose strokes are near, by ways that pay for falls of density and in measure
-// of how far that bone's strokes lie apart. Seams are cheap along the narrow valleys that joints are. In a
-// large scan seams are looked for on blocks of voxels.
+// of how far that bone's strokes lie apart. Seams are cheap along the narrow valleys that joints are, and
+// dear through cortex, which joints do not cross. In a large scan seams are looked for on blocks of voxels.
 #include "pipeline/segmentation/ct/part_bones.h"
 
 #include <algorithm>
@@ -10,6 +10,7 @@
 #include <set>
 
 #include "core/host/parallel.h"
+#include "core/numbers/quantile.h"
 #include "core/voxels/grid_lines.h"
 #include "core/voxels/to_corner.h"
 #include "core/voxels/voxel_box.h"
@@ -21,9 +22,11 @@
 namespace kvx {
 namespace {
 
-constexpr double kDiagonalsPerUnit = 1;  // what a fall by one unit of density costs
-constexpr double kSeamNats = 8;          // per face of a voxel
-constexpr double kValleyHu = 20;         // depth of a valley that makes a seam e times as cheap
+constexpr double kDiagonalsPerUnit = 1;             // what a fall by one unit of density costs
+constexpr double kSeamNats = 8;                     // per face of a voxel
+constexpr double kValleyHu = 20;                    // depth of a valley that makes a seam e times as cheap
+constexpr double kNotCortex = 0.75;                 // of what was found, the least dense part
+constexpr double kCortexPower = 3, kMostTimes = 3;  // of its density, in times of where it begins
 constexpr int kNoLabel = -1;
 constexpr float kLeastShare = 1e-4f;
 constexpr float kLeastHu = -100, kMostHu = 800;
@@ -47,22 +50,30 @@ Volume ValleysHu(Volume hu) {
   return depth;
 }
 
-Image<float> SeamRoots(Volume valleys_hu, double noise_hu) {
-  const double valley_hu = std::max(kValleyHu, noise_hu);
-  for (float& v : valleys_hu.values) v = float(std::sqrt(kSeamNats) * std::exp(-v / (2 * valley_hu)));
-  return valleys_hu;
+// Where cortex begins.
+double CortexHu(const Volume& hu, const std::vector<size_t>& found) {
+  std::vector<float> densities;
+  for (const size_t v : found) densities.push_back(std::clamp(hu.values[v], 1.0f, kMostHu));
+  return TakeQuantile(densities, kNotCortex);
+}
+
+// Of what was found.
+Image<float> SeamRoots(const Volume& hu, const std::vector<size_t>& found, double noise_hu) {
+  const double valley_hu = std::max(kValleyHu, noise_hu), cortex_hu = CortexHu(hu, found);
+  Image<float> roots = ValleysHu(hu);
+  for (const size_t v : found) {
+    const double times = std::clamp(std::min(hu.values[v], kMostHu) / cortex_hu, 1.0, kMostTimes);
+    const double nats = kSeamNats * std::pow(times, kCortexPower);
+    roots.values[v] = float(std::sqrt(nats) * std::exp(-roots.values[v] / (2 * valley_hu)));
+  }
+  return roots;
 }
 
 class Parting {
  public:
   // All on the same grid. Strokes of the bones that were found only.
   Parting(const Volume& hu, const LabelMap& strokes, const LabelMap& found)
-      : strokes_(strokes),
-        noise_hu_(NoiseHu(hu)),
-        valleys_hu_(ValleysHu(hu)),
-        density_(DensityOf(hu)),
-        labels_(found),
-        slot_(hu.grid) {
+      : strokes_(strokes), noise_hu_(NoiseHu(hu)), density_(DensityOf(hu)), labels_(found), slot_(hu.grid) {
     within_ = Mask(hu.grid);
     for (size_t v = 0; v < found.values.size(); ++v) {
       if (found.values[v] == 0) continue;
@@ -71,6 +82,7 @@ class Parting {
       voxels_.push_back(v);
       if (strokes.values[v] != 0) sources_[strokes.values[v]].push_back({v, 0});
     }
+    seam_roots_ = SeamRoots(hu, voxels_, noise_hu_);
   }
 
   LabelMap Run() {
@@ -80,7 +92,7 @@ class Parting {
       const auto of_label = nats_.find(label);
       return of_label == nats_.end() ? kNever : of_label->second[slot_.values[v]];
     };
-    return CheapestLabels(std::move(labels_), {nats, SeamRoots(std::move(valleys_hu_), noise_hu_)});
+    return CheapestLabels(std::move(labels_), {nats, seam_roots_});
   }
 
  private:
@@ -135,8 +147,8 @@ class Parting {
 
   const LabelMap& strokes_;
   const double noise_hu_;
-  Volume valleys_hu_;
   const Volume density_;
+  Image<float> seam_roots_;
   LabelMap labels_;
   Mask within_;
   Image<uint32_t> slot_;        // of a voxel that belongs to a bone, in:

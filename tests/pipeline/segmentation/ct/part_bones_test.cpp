@@ -67,6 +67,21 @@ TEST(PartedBones, MeetInANeck) {
   EXPECT_EQ(bar.Wrong(PartedBones(bar.hu, bar.strokes, bar.found), 0), 0u);
 }
 
+// A dense neck would be the shorter seam.
+TEST(PartedBones, DoNotMeetAcrossCortex) {
+  constexpr int kNeck = 17;
+  Bar bar;
+  for (size_t v = 0; v < bar.hu.values.size(); ++v) {
+    if (bar.found.values[v] == 0) continue;
+    const Eigen::Vector3i p = bar.hu.grid.Ijk(v);
+    const bool in_rod = (p.tail<2>().array() - 7).abs().maxCoeff() <= 2;
+    if (in_rod && p.x() > 8 && p.x() < kJoint - 1) bar.hu.values[v] = 800;
+    if (p.x() == kJoint) bar.hu.values[v] = 340;
+    if (p.x() == kNeck && !in_rod) bar.found.values[v] = 0, bar.hu.values[v] = 40;
+  }
+  EXPECT_EQ(bar.Wrong(PartedBones(bar.hu, bar.strokes, bar.found), 0), 0u);
+}
+
 TEST(PartedBones, KeepTheirStrokesAndWhatNoStrokeGetsTo) {
   Bar bar;
   bar.strokes(37, 9, 9) = 1;  // a stroke of the first bone deep in the second

@@ -1,6 +1,7 @@
 // A voxel is likelier a bone's whose strokes are near, by ways that pay for falls of density and in measure
-// of how far that bone's strokes lie apart. Seams are cheap along the narrow valleys that joints are, and
-// dear through cortex, which joints do not cross. In a large scan seams are looked for on blocks of voxels.
+// of how far that bone's strokes lie apart. Far from all strokes voxels say little of their own, for their
+// neighbours say the same. Seams are cheap along the narrow valleys that joints are, and dear through cortex,
+// which joints do not cross. In a large scan seams are looked for on blocks of voxels.
 #include "pipeline/segmentation/ct/part_bones.h"
 
 #include <algorithm>
@@ -25,6 +26,7 @@ namespace {
 constexpr double kDiagonalsPerUnit = 1;             // what a fall by one unit of density costs
 constexpr double kSeamNats = 8;                     // per face of a voxel
 constexpr double kValleyHu = 20;                    // depth of a valley that makes a seam e times as cheap
+constexpr double kFar = 1;                          // root of mm: there a voxel's say is half
 constexpr double kNotCortex = 0.75;                 // of what was found, the least dense part
 constexpr double kCortexPower = 3, kMostTimes = 3;  // of its density, in times of where it begins
 constexpr int kNoLabel = -1;
@@ -57,9 +59,12 @@ double CortexHu(const Volume& hu, const std::vector<size_t>& found) {
   return TakeQuantile(densities, kNotCortex);
 }
 
+// Where noise hides how deep valleys are, seams tell less.
+double SureValleyHu(double noise_hu) { return std::max(kValleyHu, noise_hu); }
+
 // Of what was found.
 Image<float> SeamRoots(const Volume& hu, const std::vector<size_t>& found, double noise_hu) {
-  const double valley_hu = std::max(kValleyHu, noise_hu), cortex_hu = CortexHu(hu, found);
+  const double valley_hu = SureValleyHu(noise_hu), cortex_hu = CortexHu(hu, found);
   Image<float> roots = ValleysHu(hu);
   for (const size_t v : found) {
     const double times = std::clamp(std::min(hu.values[v], kMostHu) / cortex_hu, 1.0, kMostTimes);
@@ -121,12 +126,20 @@ class Parting {
     for (size_t n = 0; n < voxels_.size(); ++n) {
       const uint16_t stroke = strokes_.values[voxels_[n]];
       double sum = 0;
-      for (const auto& [label, distances] : nats_) sum += Nearness(distances[n]);
+      float nearest = kNever;
+      for (const auto& [label, distances] : nats_)
+        sum += Nearness(distances[n]), nearest = std::min(nearest, distances[n]);
+      const float say = Say(nearest);
       for (auto& [label, nats] : nats_) {
         const bool never = !std::isfinite(nats[n]) || (stroke != label && sources_.contains(stroke));
-        nats[n] = never ? kNever : -std::log(float(Nearness(nats[n]) / sum) + kLeastShare);
+        nats[n] = never ? kNever : -say * std::log(float(Nearness(nats[n]) / sum) + kLeastShare);
       }
     }
+  }
+  // Of a voxel, by its distance from the nearest strokes; farther out in noise, which hides valleys.
+  float Say(float nearest) const {
+    const double parts = nearest / (kFar * SureValleyHu(noise_hu_) / kValleyHu);
+    return float(1 / (1 + parts * parts));
   }
   static double Nearness(float distance) {
     const double d = std::max(distance, 1e-3f);

@@ -57,6 +57,15 @@ TEST(PartedBones, MeetInAValleyOfTheDensity) {
   EXPECT_EQ(bar.Wrong(in_blocks, 1), 0u);
 }
 
+// The 605 voxels between half way and the valley are nearer to the other strokes, and all say the same.
+TEST(PartedBones, MeetInAShallowValleyFarFromStrokes) {
+  Bar bar;
+  for (size_t v = 0; v < bar.hu.values.size(); ++v) {
+    if (bar.found.values[v] != 0 && bar.hu.grid.Ijk(v).x() == kJoint) bar.hu.values[v] = 385;
+  }
+  EXPECT_EQ(bar.Wrong(PartedBones(bar.hu, bar.strokes, bar.found), 0), 0u);
+}
+
 TEST(PartedBones, MeetInANeck) {
   Bar bar;
   for (size_t v = 0; v < bar.hu.values.size(); ++v) {

@@ -44,6 +44,9 @@ class FolderOfTheProgram {
   pid_t made_by_ = 0;
 };
 
+// From the start: a death test may be the first that needs one.
+const FolderOfTheProgram folder_of_the_program;
+
 }  // namespace
 
 Backend& SharedBackend() {
@@ -88,10 +91,7 @@ double BetweenAxesDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return DegFromRad(std::acos(std::min(1.0, std::abs(a.dot(b)))));
 }
 
-ScratchFolder::ScratchFolder() {
-  static const FolderOfTheProgram of_all;
-  path_ = NewFolder(of_all.path(), "");
-}
+ScratchFolder::ScratchFolder() : path_(NewFolder(folder_of_the_program.path(), "")) {}
 
 ScratchFolder::~ScratchFolder() {
   std::error_code ignored;

@@ -76,7 +76,8 @@ ONLY_IN = {
 }
 # Headers that hand JSON on; everything else that includes its slow header is a source.
 JSON_HEADERS = (
-    "api/request.h cli/service/asked_jobs.h cli/service/service_client.h cli/service/study_upload.h core/text/json_object.h "
+    "api/request.h cli/service/asked_jobs.h cli/service/service_client.h cli/service/study_upload.h "
+    "core/text/json_object.h "
     "pipeline/measures/measures_json.h pipeline/model/files/json_field.h pipeline/phantom/manifest.h tests/"
 )
 

@@ -137,8 +137,8 @@ void RequireNumbers(const TextHeader& header, uint64_t values) {
 // A file that holds a header may end in something else, but not in as much again. Files of voxels alone may
 // be shared by several headers.
 void RequireNotTwice(const TextHeader& header, size_t bytes) {
-  const bool exact = VoxelStartOf(header).bytes >= 0 &&
-                     (header.format == FileFormat::kMeta || VoxelStartOf(header).lines == header.lines);
+  const auto [lines, start] = VoxelStartOf(header);
+  const bool exact = start >= 0 && (header.format == FileFormat::kMeta || lines == header.lines);
   if (header.attached && exact && MostVoxelBytes(header) >= 2.0 * double(bytes))
     throw InputError(kHoldsTwice);
 }

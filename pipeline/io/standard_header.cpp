@@ -33,11 +33,7 @@ std::string Plain(const std::string& value) {
 
 // Of one of a field's names.
 std::string FirstOf(const TextHeader& header, std::initializer_list<const char*> names) {
-  for (const char* name : names) {
-    const std::string value = header.Value(name);
-    if (!value.empty()) return Plain(value);
-  }
-  return "";
+  return Plain(header.FirstOf(names));
 }
 
 void AddLine(std::string& text, const std::string& key, const char* separator, const std::string& value) {

@@ -66,12 +66,6 @@ std::vector<size_t> ImageAxes(const TextHeader& nrrd, size_t dimension) {
   return axes;
 }
 
-std::string FirstOf(const TextHeader& header, std::initializer_list<const char*> names) {
-  for (const char* name : names)
-    if (!header.Value(name).empty()) return header.Value(name);
-  return "";
-}
-
 void RequireKnownSpace(const TextHeader& nrrd, size_t dimension) {
   static const std::set<std::string> kKnown{
       "rightanteriorsuperior", "ras", "leftanteriorsuperior", "las",
@@ -98,8 +92,8 @@ void RequireKnownSpace(const TextHeader& nrrd, size_t dimension) {
 void RequireSpacings(const TextHeader& nrrd, size_t dimension) {
   const Words spacings = Split(nrrd.Value("spacings"));
   if (spacings.empty()) {
-    const bool by_ends = !FirstOf(nrrd, {"axis maxs", "axismaxs"}).empty();
-    if (by_ends && FirstOf(nrrd, {"space directions", "spacedirections"}).empty()) {
+    const bool by_ends = !nrrd.FirstOf({"axis maxs", "axismaxs"}).empty();
+    if (by_ends && nrrd.FirstOf({"space directions", "spacedirections"}).empty()) {
       throw InputError(
           "the volume's header gives the ends of its axes (axis mins, axis maxs) but no voxel spacing; save "
           "it with spacings or space directions");
@@ -111,7 +105,7 @@ void RequireSpacings(const TextHeader& nrrd, size_t dimension) {
 }
 
 void RequireDirections(const TextHeader& nrrd, size_t dimension) {
-  const Words vectors = Vectors(FirstOf(nrrd, {"space directions", "spacedirections"}));
+  const Words vectors = Vectors(nrrd.FirstOf({"space directions", "spacedirections"}));
   if (vectors.empty()) {
     if (nrrd.Value("space").empty() || nrrd.Value("spacings").empty()) return;
     throw InputError(
@@ -132,7 +126,7 @@ void RequireNrrdGeometry(const TextHeader& nrrd) {
   RequireKnownSpace(nrrd, dimension);
   RequireSpacings(nrrd, dimension);
   RequireDirections(nrrd, dimension);
-  if (!AllFinite(Components(FirstOf(nrrd, {"space origin", "spaceorigin"})))) throw InputError(kBadAxes);
+  if (!AllFinite(Components(nrrd.FirstOf({"space origin", "spaceorigin"})))) throw InputError(kBadAxes);
 }
 
 void RequireMetaGeometry(const TextHeader& meta) {

@@ -114,16 +114,13 @@ int WholeNumber(const std::string& text) {
 
 // Of one of a field's names, at least -1; 0 where the header does not say.
 int64_t SkipOf(const TextHeader& header, std::initializer_list<const char*> names) {
-  for (const char* name : names) {
-    const std::string text = header.Value(name);
-    if (text.empty()) continue;
-    int64_t number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    const bool whole = error == std::errc() && end == text.data() + text.size();
-    if (!whole || number < -1 || number > kMostSkipped) throw InputError(kBadHeader);
-    return number;
-  }
-  return 0;
+  const std::string text = header.FirstOf(names);
+  if (text.empty()) return 0;
+  int64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool whole = error == std::errc() && end == text.data() + text.size();
+  if (!whole || number < -1 || number > kMostSkipped) throw InputError(kBadHeader);
+  return number;
 }
 
 bool IsYes(const std::string& text) {
@@ -133,8 +130,7 @@ bool IsYes(const std::string& text) {
 // Of a NRRD in quotes.
 std::vector<std::string> UnitsOf(const TextHeader& header) {
   if (header.format == FileFormat::kMeta) return {header.Value("distanceunits")};
-  std::string text = header.Value("space units");
-  if (text.empty()) text = header.Value("units");
+  const std::string text = header.FirstOf({"space units", "units"});
   std::vector<std::string> units;
   for (size_t begin = text.find('"'); begin != text.npos; begin = text.find('"', begin)) {
     const size_t end = std::min(text.find('"', begin + 1), text.size());
@@ -222,6 +218,12 @@ Segment SegmentAt(const TextHeader& nrrd, size_t index) {
 std::string TextHeader::Value(const std::string& key) const {
   const auto found = fields.find(key);
   return found == fields.end() ? "" : found->second;
+}
+
+std::string TextHeader::FirstOf(std::initializer_list<const char*> names) const {
+  for (const char* name : names)
+    if (!Value(name).empty()) return Value(name);
+  return "";
 }
 
 bool IsNameable(const std::string& data_file) {

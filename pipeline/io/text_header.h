@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <map>
 #include <string>
 #include <vector>
@@ -20,6 +21,8 @@ struct TextHeader {
   bool attached = true;
 
   std::string Value(const std::string& key) const;  // empty where it does not say
+  // Of a field with several names, the first that says something; else empty.
+  std::string FirstOf(std::initializer_list<const char*> names) const;
 };
 
 // Throws InputError for headers that are damaged, say a thing twice or have no end, for sizes or dimensions

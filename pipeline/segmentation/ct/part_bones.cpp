@@ -78,7 +78,12 @@ class Parting {
  public:
   // All on the same grid. Strokes of the bones that were found only.
   Parting(const Volume& hu, const LabelMap& strokes, const LabelMap& found)
-      : strokes_(strokes), noise_hu_(NoiseHu(hu)), density_(DensityOf(hu)), labels_(found), slot_(hu.grid) {
+      : hu_(hu),
+        strokes_(strokes),
+        noise_hu_(NoiseHu(hu)),
+        density_(DensityOf(hu)),
+        labels_(found),
+        slot_(hu.grid) {
     within_ = Mask(hu.grid);
     for (size_t v = 0; v < found.values.size(); ++v) {
       if (found.values[v] == 0) continue;
@@ -87,7 +92,6 @@ class Parting {
       voxels_.push_back(v);
       if (strokes.values[v] != 0) sources_[strokes.values[v]].push_back({v, 0});
     }
-    seam_roots_ = SeamRoots(hu, voxels_, noise_hu_);
   }
 
   LabelMap Run() {
@@ -97,7 +101,7 @@ class Parting {
       const auto of_label = nats_.find(label);
       return of_label == nats_.end() ? kNever : of_label->second[slot_.values[v]];
     };
-    return CheapestLabels(std::move(labels_), {nats, seam_roots_});
+    return CheapestLabels(std::move(labels_), {nats, SeamRoots(hu_, voxels_, noise_hu_)});
   }
 
  private:
@@ -158,10 +162,10 @@ class Parting {
     return likeliest;
   }
 
+  const Volume& hu_;
   const LabelMap& strokes_;
   const double noise_hu_;
   const Volume density_;
-  Image<float> seam_roots_;
   LabelMap labels_;
   Mask within_;
   Image<uint32_t> slot_;        // of a voxel that belongs to a bone, in:

@@ -83,7 +83,7 @@ class ModelPoser {
                            const std::filesystem::path& path) = 0;
   virtual std::string RawVolume(const PosedQuery& query) = 0;  // the raw form, in memory
   virtual void WriteDicom(const PosedQuery& query, const DicomNames& names,
-                          const std::filesystem::path& path) = 0;  // a zip of one series
+                          const std::filesystem::path& path) = 0;  // a zip of one series; labels: one file
   // RawHeader of its grid with `errors`, then the displacement
   // to the template per node: three floats, LPS mm.
   virtual std::string Field(const PosedQuery& query) = 0;

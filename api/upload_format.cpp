@@ -4,14 +4,9 @@
 #include "core/text/extension.h"
 
 namespace kvx {
-namespace {
-
-constexpr char kDicomSuffix[] = ".dcm";
-
-}  // namespace
 
 std::optional<UploadFormat> FindUploadFormat(const std::string& filename) {
-  for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha", kDicomSuffix}) {
+  for (const char* suffix : {".nii.gz", ".nii", ".nrrd", ".mha", ".dcm"}) {
     if (HasExtension(filename, suffix)) return UploadFormat{suffix, false};
   }
   if (HasExtension(filename, ".tgz")) return UploadFormat{".tar.gz", true};
@@ -27,7 +22,5 @@ UploadFormat RequireUploadFormat(const std::string& filename) {
       "'filename' ends in .nii, .nii.gz, .nrrd or .mha, in .dcm for a DICOM image of many frames, or in "
       ".zip, .tar or .tar.gz for a DICOM series");
 }
-
-bool MayHoldLabels(const UploadFormat& format) { return !format.archive && format.suffix != kDicomSuffix; }
 
 }  // namespace kvx

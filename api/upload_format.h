@@ -12,6 +12,4 @@ struct UploadFormat {
 std::optional<UploadFormat> FindUploadFormat(const std::string& filename);
 UploadFormat RequireUploadFormat(const std::string& filename);  // throws InputError
 
-bool MayHoldLabels(const UploadFormat& format);
-
 }  // namespace kvx

@@ -23,7 +23,9 @@ struct PoseArguments {
   std::string modality;
 };
 
-bool IsDicom(const std::filesystem::path& out) { return HasExtension(out, ".zip"); }
+bool IsDicom(const PoseArguments& arguments) {
+  return HasExtension(arguments.out, arguments.label ? ".dcm" : ".zip");
+}
 
 std::string Document(const Grid& grid, const ResolvedPose& pose, double folded_fraction, const Model& model) {
   const auto numbers = [](const Eigen::Vector3d& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
@@ -62,23 +64,37 @@ void RequireMapOut(const PoseArguments& arguments) {
 }
 
 void RequireFitting(const PoseArguments& arguments) {
-  RequireVolumeOr(".zip", "a DICOM series; for one file", arguments.out);
+  if (arguments.label)
+    RequireVolumeOr(".dcm", "a DICOM segmentation (SEG); else", arguments.out);
+  else
+    RequireVolumeOr(".zip", "a DICOM series; for one file", arguments.out);
   RequireMayWrite(arguments.out);
   if (!arguments.extrapolation_map.empty()) RequireMapOut(arguments);
-  if (!IsDicom(arguments.out) && !arguments.modality.empty())
-    throw UsageError("--modality is for DICOM: an --out that ends in .zip");
-  if (IsDicom(arguments.out) && arguments.label)
-    throw UsageError("labels are not available as DICOM; choose another extension for --out");
+  if (!IsDicom(arguments) && !arguments.modality.empty())
+    throw UsageError("--modality is for DICOM: an --out that ends in .zip, or with --label in .dcm");
+}
+
+DicomSeries SeriesOf(const PoseArguments& arguments, const PoseRequest& request, const ResolvedPose& pose,
+                     const Model& model) {
+  const PosedAs as{request, arguments.pose.Mode(), arguments.level, LargestExtrapolation(pose)};
+  const std::string patient_id = model.manifest().template_key.Hex().substr(0, 16);
+  return kvx::SeriesOf(model, as, arguments.modality, patient_id);
+}
+
+// A segmentation names the images that it is of, which are made for that.
+void WriteBones(const PoseArguments& arguments, const PoseRequest& request, const ResolvedPose& pose,
+                const LabelMap& labels, const Model& model, const PosingEngine& engine) {
+  if (!IsDicom(arguments)) return WriteLabels(arguments.out, labels);
+  const Volume posed = engine.Pose(pose, {}, arguments.level).volume;
+  ThrowIfInterrupted();
+  WritePosedBones(arguments.out, model, labels, posed, SeriesOf(arguments, request, pose, model));
 }
 
 void Write(const PoseArguments& arguments, const PoseRequest& request, const ResolvedPose& pose,
            const Volume& posed, const Model& model) {
   const Scan& from = model.template_scan();
-  if (!IsDicom(arguments.out)) return WriteVolume(arguments.out, posed, from.stored_as);
-  const PosedAs as{request, arguments.pose.Mode(), arguments.level, LargestExtrapolation(pose)};
-  const std::string patient_id = model.manifest().template_key.Hex().substr(0, 16);
-  WriteDicomZip(arguments.out, posed, DicomGreysOf(from),
-                SeriesOf(model, as, arguments.modality, patient_id));
+  if (!IsDicom(arguments)) return WriteVolume(arguments.out, posed, from.stored_as);
+  WriteDicomZip(arguments.out, posed, DicomGreysOf(from), SeriesOf(arguments, request, pose, model));
 }
 
 void Run(const PoseArguments& arguments, const CommandContext& context) {
@@ -98,7 +114,7 @@ void Run(const PoseArguments& arguments, const CommandContext& context) {
     const LabelMap labels = engine->PoseLabels(pose, {}, arguments.level);
     grid = labels.grid;
     ThrowIfInterrupted();
-    WriteLabels(arguments.out, labels);
+    WriteBones(arguments, request, pose, labels, model, *engine);
   } else {
     const PosedVolume posed = engine->Pose(pose, {}, arguments.level);
     grid = posed.volume.grid;
@@ -125,12 +141,13 @@ void AddPose(CLI::App& program, CommandContext& context) {
   AddModality(*command, arguments->modality);
   AddOut(*command, arguments->out,
          "Volume to write; format by extension (.nii, .nii.gz, .nrrd, .mha, .mhd with its voxels in "
-         "NAME.raw; .zip: a DICOM series)");
+         "NAME.raw; .zip: a DICOM series; with --label .dcm: a DICOM segmentation of that series)");
   AddComputing(*command, context);
   command->footer(
       "Examples:\n  kinevox pose knee.model --joint tibia.flexion=35 --out bent.nii.gz\n"
       "  kinevox pose hand.model --pose fist.json --level 1 --out fist.nrrd\n"
       "  kinevox pose knee.model --scan pose02 --label --out bones.nii.gz\n"
+      "  kinevox pose knee.model --scan pose02 --label --out bones.dcm\n"
       "  kinevox pose knee.model --joint tibia.flexion=35 --modality MR --out series.zip");
   command->callback([arguments, &context] { Run(*arguments, context); });
 }

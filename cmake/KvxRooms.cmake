@@ -47,7 +47,7 @@ function(kvx_room name)
 endfunction()
 
 # The only place that sees ITK, libpng and archives of arrays: slow headers stay behind it.
-file(GLOB io_sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/pipeline/io/*.cpp)
+file(GLOB_RECURSE io_sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/pipeline/io/*.cpp)
 if(NOT io_sources)
   message(FATAL_ERROR "pipeline/io is empty")
 endif()

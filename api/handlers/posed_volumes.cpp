@@ -15,6 +15,7 @@ struct FormatName {
   const char* content_type;
   bool coded;  // worth a content coding
 };
+constexpr FormatName kBonesAsDicom{"dicom", "dcm", VolumeFormat::kDicom, "application/dicom", false};
 constexpr FormatName kFormats[] = {{"nii.gz", "nii.gz", VolumeFormat::kNiftiGz, "application/gzip", false},
                                    {"nii", "nii", VolumeFormat::kNifti, "application/octet-stream", true},
                                    {"nrrd", "nrrd", VolumeFormat::kNrrd, "application/octet-stream", false},
@@ -22,8 +23,9 @@ constexpr FormatName kFormats[] = {{"nii.gz", "nii.gz", VolumeFormat::kNiftiGz, 
                                    {"raw", "raw", VolumeFormat::kRaw, "application/octet-stream", true},
                                    {"dicom", "zip", VolumeFormat::kDicom, "application/zip", false}};
 
-const FormatName& FormatOf(const Query& query) {
+const FormatName& FormatOf(const Query& query, bool labels) {
   const std::string wanted = QueryValue(query, "format", "nii.gz");
+  if (labels && wanted == kBonesAsDicom.name) return kBonesAsDicom;
   for (const FormatName& format : kFormats) {
     if (format.name == wanted) return format;
   }
@@ -39,7 +41,6 @@ DicomNames DicomNamesOf(Services& services, const FormatName& format, const Quer
     return {};
   }
   if (!modality.empty() && modality != "MR" && modality != "CT") throw InputError("'modality' is MR or CT");
-  if (posed.labels) throw InputError("labels are not available as DICOM; use nii.gz, nii, nrrd, mha or raw");
   return {services.catalogue.RequireModel(posed.model).subject, modality};
 }
 
@@ -68,10 +69,11 @@ std::shared_ptr<const CachedFile> PlainVolume(Services& services, const PosedQue
 
 FileAnswer GetVolume(Services& services, const std::string& model, const Query& query,
                      const std::string& pose, const Conditions& conditions) {
-  const FormatName& format = FormatOf(query);
+  const bool labels = QueryYesOrNo(query, "label");
+  const FormatName& format = FormatOf(query, labels);
   PosedQuery posed =
       PosedQueryOf(services, model, query, {"format", "mode", "level", "label", "modality"}, pose);
-  posed.labels = QueryYesOrNo(query, "label");
+  posed.labels = labels;
   RequireBuilt(services, model);
   const DicomNames names = DicomNamesOf(services, format, query, posed);
   const Encoding encoding = format.coded ? BestEncoding(conditions.accept_encoding) : Encoding::kIdentity;

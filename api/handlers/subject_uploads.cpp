@@ -59,7 +59,10 @@ Upload Upload::OfBones(Services& services, const std::string& subject, const Que
   RequireName(name, "'template'");
   RequireTemplate(services, subject, name);
   const UploadFormat format = RequireUploadFormat(QueryValue(query, "filename", kBonesFilename));
-  if (!MayHoldLabels(format)) throw InputError("a label map is one file: .nii, .nii.gz, .nrrd or .mha");
+  if (format.archive) {
+    throw InputError(
+        "a label map is one file: .nii, .nii.gz, .nrrd or .mha, or .dcm of a DICOM segmentation (SEG)");
+  }
   return Upload(services, bones == BonesKind::kSeeds ? Kind::kStrokes : Kind::kBones, subject, name, format,
                 query, key, std::move(received));
 }

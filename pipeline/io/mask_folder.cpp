@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "core/errors.h"
-#include "pipeline/io/series_folder.h"
+#include "pipeline/io/dicom/series_folder.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/io/voxel_values.h"
 

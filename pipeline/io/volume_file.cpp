@@ -9,7 +9,8 @@
 #include "core/errors.h"
 #include "core/text/extension.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/dicom_series.h"
+#include "pipeline/io/dicom/dicom_segments.h"
+#include "pipeline/io/dicom/dicom_series.h"
 #include "pipeline/io/itk_image.h"
 #include "pipeline/io/nifti_file.h"
 #include "pipeline/io/segment_layers.h"
@@ -102,10 +103,26 @@ void Write(const std::filesystem::path& named, const Grid& grid, ScalarType type
 }
 
 // As it is stored, "not a number" among its values.
-Scan ReadStored(const std::filesystem::path& path, DicomUse use) {
-  if (HoldsDicom(path)) return ReadDicomSeries(path, use);
+Scan ReadStored(const std::filesystem::path& path) {
+  if (HoldsDicom(path)) return ReadDicomSeries(path);
   const FileFormat format = RequireReadable(path);
   return format == FileFormat::kNifti ? ReadNifti(path) : ReadItkScan(format, path);
+}
+
+// Of a file whose voxels are the labels.
+LabelMap ReadNumbers(const std::filesystem::path& path) {
+  Scan scan = ReadStored(path);
+  FillUnmeasured(scan.volume.values, 0);
+  LabelMap labels(scan.volume.grid);
+  for (size_t v = 0; v < labels.values.size(); ++v) {
+    const float value = scan.volume.values[v], whole = std::round(value);
+    if (!(whole >= 0 && whole <= 65535) || std::abs(value - whole) > kMostRounding) {
+      throw InputError(
+          "the label map holds values that are not whole numbers from 0 to 65535; is it a label map?");
+    }
+    labels.values[v] = uint16_t(whole);
+  }
+  return labels;
 }
 
 }  // namespace
@@ -125,13 +142,13 @@ bool HoldsDicom(const std::filesystem::path& path) {
 }
 
 Scan ReadScan(const std::filesystem::path& path) {
-  Scan scan = ReadStored(path, DicomUse::kScan);
+  Scan scan = ReadStored(path);
   FillUnmeasured(scan.volume.values, SmallestMeasured(scan.volume.values));
   return scan;
 }
 
 VolumeInfo ReadVolumeInfo(const std::filesystem::path& path) {
-  if (HoldsDicom(path)) return ReadDicomSeriesInfo(path, DicomUse::kScan);
+  if (HoldsDicom(path)) return ReadDicomSeriesInfo(path);
   const FileFormat format = RequireReadable(path);
   if (format == FileFormat::kNifti) return ReadNiftiInfo(path);
   const ItkHeader header = ReadItkHeader(format, path);
@@ -139,29 +156,21 @@ VolumeInfo ReadVolumeInfo(const std::filesystem::path& path) {
 }
 
 Grid ReadLabelsGrid(const std::filesystem::path& path) {
-  if (HoldsDicom(path)) return ReadDicomSeriesInfo(path, DicomUse::kLabels).grid;
+  if (HoldsDicom(path)) {
+    if (const auto grid = FindDicomSegmentsGrid(path)) return *grid;
+  }
   return IsLayered(path) ? SegmentLayersGrid(path) : ReadVolumeInfo(path).grid;
 }
 
 LayeredLabels ReadLayeredLabels(const std::filesystem::path& path) {
-  return IsLayered(path) ? ReadSegmentLayers(path) : LayeredLabels{ReadLabels(path), {}};
+  if (IsLayered(path)) return ReadSegmentLayers(path);
+  if (HoldsDicom(path)) {
+    if (auto segments = FindDicomSegments(path)) return *std::move(segments);
+  }
+  return {ReadNumbers(path), {}};
 }
 
-LabelMap ReadLabels(const std::filesystem::path& path) {
-  if (IsLayered(path)) return ReadSegmentLayers(path).labels;
-  Scan scan = ReadStored(path, DicomUse::kLabels);
-  FillUnmeasured(scan.volume.values, 0);
-  LabelMap labels(scan.volume.grid);
-  for (size_t v = 0; v < labels.values.size(); ++v) {
-    const float value = scan.volume.values[v], whole = std::round(value);
-    if (!(whole >= 0 && whole <= 65535) || std::abs(value - whole) > kMostRounding) {
-      throw InputError(
-          "the label map holds values that are not whole numbers from 0 to 65535; is it a label map?");
-    }
-    labels.values[v] = uint16_t(whole);
-  }
-  return labels;
-}
+LabelMap ReadLabels(const std::filesystem::path& path) { return ReadLayeredLabels(path).labels; }
 
 void WriteVolume(const std::filesystem::path& path, const Volume& volume, ScalarType type) {
   Write(path, volume.grid, type, 1, Packed(type, volume.values));

@@ -27,9 +27,9 @@ bool HoldsDicom(const std::filesystem::path& path);  // a folder, or a .dcm file
 // the header names none that lies beside it.
 std::filesystem::path DetachedData(const std::filesystem::path& path);
 VolumeInfo ReadVolumeInfo(const std::filesystem::path& path);  // header only where the format allows
-// As a scan, but a DICOM segmentation (SEG) of one segment, which is no scan, counts before other DICOM
-// images; where it has one bit a voxel, 1 is inside. Integer values 0..65535, or segments in layers, numbered
-// in their order (pipeline/io/segment_layers.h); "not a number" is 0. Throws InputError otherwise.
+// As a scan, but a DICOM segmentation (SEG, pipeline/io/dicom/dicom_segments.h), which is no scan, counts
+// before other DICOM images. Integer values 0..65535, or segments in layers, numbered in their order
+// (pipeline/io/segment_layers.h); "not a number" is 0. Throws InputError otherwise.
 LabelMap ReadLabels(const std::filesystem::path& path);
 LayeredLabels ReadLayeredLabels(const std::filesystem::path& path);  // the same, with what layers share
 Grid ReadLabelsGrid(const std::filesystem::path& path);

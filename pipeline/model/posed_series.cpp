@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/io/dicom/segmentation_writer.h"
+
 namespace kvx {
 namespace {
 
@@ -109,6 +111,14 @@ DicomSeries SeriesOf(const Model& model, const PosedAs& posed, const std::string
           WorldOf(manifest, posed.request),
           text.description,
           text.comment};
+}
+
+void WritePosedBones(const std::filesystem::path& path, const Model& model, const LabelMap& labels,
+                     const Volume& posed, const DicomSeries& series) {
+  std::map<int, std::string> names;
+  for (const Bone& bone : model.bones().bones) names[bone.label] = bone.name;
+  WriteDicomSegmentation(path, labels, names, series,
+                         ImagesOf(posed, DicomGreysOf(model.template_scan()), series));
 }
 
 }  // namespace kvx

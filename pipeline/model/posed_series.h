@@ -1,6 +1,7 @@
-// A posed model as a DICOM series: what an archive's list of series shows of the pose.
+// A posed model as a DICOM series: what an archive's list of series shows of the pose, and its bones as a
+// segmentation of that series.
 #pragma once
-#include "pipeline/io/dicom_writer.h"
+#include "pipeline/io/dicom/dicom_writer.h"
 #include "pipeline/model/model.h"
 
 namespace kvx {
@@ -22,5 +23,9 @@ SeriesText TextOf(const PosedAs& posed, const std::vector<std::string>& scan_nam
 // `modality`: empty for the template scan's own.
 DicomSeries SeriesOf(const Model& model, const PosedAs& posed, const std::string& modality,
                      const std::string& patient_id);
+
+// A DICOM segmentation (one file) of the images that `posed` makes as a series; `labels` lie on its grid.
+void WritePosedBones(const std::filesystem::path& path, const Model& model, const LabelMap& labels,
+                     const Volume& posed, const DicomSeries& series);
 
 }  // namespace kvx

@@ -8,8 +8,8 @@
 
 #include "core/errors.h"
 #include "core/numbers/value_range.h"
+#include "pipeline/io/dicom/series_folder.h"
 #include "pipeline/io/mask_folder.h"
-#include "pipeline/io/series_folder.h"
 #include "pipeline/io/volume_file.h"
 #include "pipeline/scans/filled_corners.h"
 #include "pipeline/scans/grey_kind.h"

@@ -217,8 +217,10 @@ void PipelinePoser::WriteDicom(const PosedQuery& query, const DicomNames& names,
   const Posing posing = Begin(query);
   const Model& model = posing.loaded->model;
   const PosedAs as{query.pose, query.mode, query.level, LargestExtrapolation(posing.pose)};
-  WriteDicomZip(path, posing.engine.Pose(posing.pose, {}, query.level).volume,
-                DicomGreysOf(model.template_scan()), SeriesOf(model, as, names.modality, names.patient_id));
+  const DicomSeries series = SeriesOf(model, as, names.modality, names.patient_id);
+  const Volume posed = posing.engine.Pose(posing.pose, {}, query.level).volume;
+  if (!query.labels) return WriteDicomZip(path, posed, DicomGreysOf(model.template_scan()), series);
+  WritePosedBones(path, model, posing.engine.PoseLabels(posing.pose, {}, query.level), posed, series);
 }
 
 std::string PipelinePoser::RawVolume(const PosedQuery& query) {

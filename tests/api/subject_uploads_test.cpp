@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "api/handlers/scans.h"
-#include "pipeline/io/pack_series.h"
+#include "pipeline/io/dicom/pack_series.h"
 #include "tests/support/handler_requests.h"
 
 namespace kvx {
@@ -97,13 +97,19 @@ TEST(Uploads, WhoseNameIsTakenMeanwhileLeavesNothing) {
   EXPECT_EQ(w.FilesUnder("blobs") + w.FilesUnder("incoming"), 1u);
 }
 
-TEST(Uploads, ADicomImageMayBeAScanButNoLabelMap) {
+TEST(Uploads, ADicomImageMayBeAScanOrALabelMap) {
   ServiceWorld w;
   const std::string subject = NewSubjectId(w);
   const Json scan = Json::parse(SendScan(w, subject, "pose00", "VOXELS", "", "IM0001.DCM").body);
   EXPECT_EQ(w.catalogue.RequireScan(scan["id"]).file.suffix, ".dcm");
-  EXPECT_THROW(Upload::OfBones(w.services, subject, {{"template", "pose00"}, {"filename", "b.dcm"}}, ""),
-               InputError);
+  const auto bones = [&](const std::string& name) {
+    return Upload::OfBones(w.services, subject, {{"template", "pose00"}, {"filename", name}}, "");
+  };
+  EXPECT_THROW(bones("b.zip"), InputError);
+  Upload segmentation = bones("b.dcm");
+  segmentation.Write(std::string("LABELS"));
+  const Json made = Json::parse(segmentation.Finish().body);
+  EXPECT_EQ(w.catalogue.RequireBones(made["id"]).file.suffix, ".dcm");
 }
 
 TEST(Uploads, TheSameRequestAgainGetsTheSameAnswer) {

@@ -56,6 +56,7 @@ class DicomBytes {
   static constexpr char kLabelMapSegmentation[] = "1.2.840.10008.5.1.4.1.1.66.7";
 
   static constexpr char kExplicitLittleEndian[] = "1.2.840.10008.1.2.1";
+  static constexpr char kRunLengths[] = "1.2.840.10008.1.2.5";
   static constexpr char kJpeg2000[] = "1.2.840.10008.1.2.4.90";
   static constexpr char kMpeg4[] = "1.2.840.10008.1.2.4.102";
   static constexpr char kHighThroughputJpeg2000[] = "1.2.840.10008.1.2.4.201";

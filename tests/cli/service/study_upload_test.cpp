@@ -1,5 +1,5 @@
 // A series that is packed for an upload and unpacked by a service.
-#include "pipeline/io/pack_series.h"
+#include "pipeline/io/dicom/pack_series.h"
 
 #include <gtest/gtest.h>
 

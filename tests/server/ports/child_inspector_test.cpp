@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "core/errors.h"
-#include "pipeline/io/pack_series.h"
+#include "pipeline/io/dicom/pack_series.h"
 #include "server/log.h"
 #include "tests/support/fixtures.h"
 

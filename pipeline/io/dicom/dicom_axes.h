@@ -1,7 +1,7 @@
 // The axes of a series' grid: headers give them as direction cosines, rounded, by some programs to two
 // digits.
 #pragma once
-#include "pipeline/io/dicom_header.h"
+#include "pipeline/io/dicom/dicom_header.h"
 
 namespace kvx {
 

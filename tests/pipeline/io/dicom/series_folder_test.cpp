@@ -1,5 +1,5 @@
 // Which files of a folder may belong to its series.
-#include "pipeline/io/series_folder.h"
+#include "pipeline/io/dicom/series_folder.h"
 
 #include <gtest/gtest.h>
 

@@ -1,17 +1,12 @@
-// By DCMTK. Value representations are named with every tag, so no data dictionary is needed at run time.
 // Attributes: DICOM PS3.3, A.3 (CT), A.4 (MR), A.8.1 (secondary capture).
-#include "pipeline/io/dicom_writer.h"
-
-#include <dcmtk/config/osconfig.h>
-#include <dcmtk/dcmdata/dcostrmb.h>
-#include <dcmtk/dcmdata/dctk.h>
+#include "pipeline/io/dicom/dicom_writer.h"
 
 #include <algorithm>
 #include <cmath>
 #include <span>
 
 #include "core/errors.h"
-#include "core/version.h"
+#include "pipeline/io/dicom/dicom_elements.h"
 #include "pipeline/io/zip_file.h"
 
 namespace kvx {
@@ -21,48 +16,6 @@ constexpr float kFullScale = 32767;
 constexpr double kLevelsEnough = 1000;  // of values without end: more than a screen shows
 
 const char kNotFinite[] = "a volume with values that are not finite cannot be DICOM";
-
-void Require(const OFCondition& done) {
-  if (done.bad()) throw Unavailable("a DICOM image cannot be made; is there memory left?");
-}
-
-void Put(DcmItem& item, const DcmTagKey& key, DcmEVR vr, const std::string& value) {
-  Require(item.putAndInsertString(DcmTag(key, vr), value.c_str()));
-}
-
-void Put(DcmItem& item, const DcmTagKey& key, int value) {
-  Require(item.putAndInsertUint16(DcmTag(key, EVR_US), Uint16(value)));
-}
-
-// At most 16 letters, as DS asks for.
-std::string Decimal(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.10g", value == 0 ? 0.0 : value);
-  return text;
-}
-
-std::string Decimals(std::initializer_list<double> values) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "" : "\\") + Decimal(value);
-  return text;
-}
-
-// A UUID of version 8 (RFC 9562) out of the digest, as PS3.5 B.2 writes it.
-std::string UidOf(const Digest& digest, std::string_view what, int number = 0) {
-  Digest bits = Hasher().Add(digest).Add(what).Add(int64_t(number)).Finish();
-  bits.bytes[6] = (bits.bytes[6] & 0x0f) | 0x80;
-  bits.bytes[8] = (bits.bytes[8] & 0x3f) | 0x80;
-  unsigned __int128 value = 0;
-  for (int b = 0; b < 16; ++b) value = value << 8 | bits.bytes[b];
-  std::string digits;
-  for (; value; value /= 10) digits.insert(digits.begin(), char('0' + int(value % 10)));
-  return "2.25." + digits;
-}
-
-// Two patients share none, though they may have the same scans.
-std::string UidOf(const DicomSeries& series, const Digest& digest, std::string_view what) {
-  return UidOf(Hasher().Add(digest).Add(series.patient_id).Finish(), what);
-}
 
 // The least of 1, 2, 5 times a power of ten that brings `largest` into 16 bits, or half a step beyond.
 double StepFor(float largest) {
@@ -112,43 +65,6 @@ const char* SopClassOf(const std::string& modality) {
   return modality == "CT" ? UID_CTImageStorage : UID_SecondaryCaptureImageStorage;
 }
 
-// Not zero. Series of a study seldom have the same: archives list and sort by it.
-int SeriesNumberOf(const Digest& content) {
-  constexpr int kMost = 999999;
-  int number = 0;
-  for (int b = 0; b < 3; ++b) number = number << 8 | content.bytes[b];
-  return 1 + number % kMost;
-}
-
-void PutOrigin(DcmItem& set, const DicomSeries& series, const Digest& content) {
-  const bool known = series.modality == "MR" || series.modality == "CT";
-  Put(set, DCM_PatientName, EVR_PN, "");
-  Put(set, DCM_PatientID, EVR_LO, series.patient_id);
-  Put(set, DCM_PatientBirthDate, EVR_DA, "");
-  Put(set, DCM_PatientSex, EVR_CS, "");
-  Put(set, DCM_PatientIdentityRemoved, EVR_CS, "YES");
-  Put(set, DCM_DeidentificationMethod, EVR_LO, "Made anew: of the scans' headers only modality and geometry");
-  Put(set, DCM_LongitudinalTemporalInformationModified, EVR_CS, "REMOVED");
-  Put(set, DCM_StudyInstanceUID, EVR_UI, UidOf(series, series.study, "study"));
-  Put(set, DCM_StudyDate, EVR_DA, "");
-  Put(set, DCM_StudyTime, EVR_TM, "");
-  Put(set, DCM_ReferringPhysicianName, EVR_PN, "");
-  Put(set, DCM_StudyID, EVR_SH, "");
-  Put(set, DCM_AccessionNumber, EVR_SH, "");
-  Put(set, DCM_Modality, EVR_CS, known ? series.modality : "OT");
-  Put(set, DCM_SeriesInstanceUID, EVR_UI, UidOf(content, "series"));
-  Put(set, DCM_SeriesNumber, EVR_IS, std::to_string(SeriesNumberOf(content)));
-  Put(set, DCM_SeriesDescription, EVR_LO, series.description);
-  Put(set, DCM_Laterality, EVR_CS, "");
-  Put(set, DCM_PatientPosition, EVR_CS, "");
-  Put(set, DCM_FrameOfReferenceUID, EVR_UI, UidOf(series, series.world, "frame of reference"));
-  Put(set, DCM_PositionReferenceIndicator, EVR_LO, "");
-  Put(set, DCM_Manufacturer, EVR_LO, "Kinevox");
-  Put(set, DCM_SoftwareVersions, EVR_LO, ProgramVersion());
-  Put(set, DCM_DerivationDescription, EVR_ST, "Computed by Kinevox from several scans; not an acquisition");
-  if (!series.comment.empty()) Put(set, DCM_ImageComments, EVR_LT, series.comment);
-}
-
 void PutModality(DcmItem& set, const std::string& modality) {
   if (modality == "MR") {
     Put(set, DCM_ImageType, EVR_CS, "DERIVED\\SECONDARY\\OTHER");
@@ -171,18 +87,14 @@ void PutModality(DcmItem& set, const std::string& modality) {
 
 // What the standard has for MR images. It is of stored values, as the rescale slope is: they do not add up.
 void PutRealWorldValues(DcmItem& set, double step) {
-  DcmItem *map = nullptr, *unit = nullptr;
-  Require(set.findOrCreateSequenceItem(DcmTag(DCM_RealWorldValueMappingSequence, EVR_SQ), map));
-  Require(map->putAndInsertSint16(DcmTag(DCM_RealWorldValueFirstValueMapped, EVR_SS), -32767));
-  Require(map->putAndInsertSint16(DcmTag(DCM_RealWorldValueLastValueMapped, EVR_SS), 32767));
-  Require(map->putAndInsertFloat64(DcmTag(DCM_RealWorldValueIntercept, EVR_FD), 0));
-  Require(map->putAndInsertFloat64(DcmTag(DCM_RealWorldValueSlope, EVR_FD), step));
-  Put(*map, DCM_LUTExplanation, EVR_LO, "intensity as in the scans");
-  Put(*map, DCM_LUTLabel, EVR_SH, "intensity");
-  Require(map->findOrCreateSequenceItem(DcmTag(DCM_MeasurementUnitsCodeSequence, EVR_SQ), unit));
-  Put(*unit, DCM_CodeValue, EVR_SH, "1");
-  Put(*unit, DCM_CodingSchemeDesignator, EVR_SH, "UCUM");
-  Put(*unit, DCM_CodeMeaning, EVR_LO, "no units");
+  DcmItem& map = AddItem(set, DCM_RealWorldValueMappingSequence);
+  Require(map.putAndInsertSint16(DcmTag(DCM_RealWorldValueFirstValueMapped, EVR_SS), -32767));
+  Require(map.putAndInsertSint16(DcmTag(DCM_RealWorldValueLastValueMapped, EVR_SS), 32767));
+  Require(map.putAndInsertFloat64(DcmTag(DCM_RealWorldValueIntercept, EVR_FD), 0));
+  Require(map.putAndInsertFloat64(DcmTag(DCM_RealWorldValueSlope, EVR_FD), step));
+  Put(map, DCM_LUTExplanation, EVR_LO, "intensity as in the scans");
+  Put(map, DCM_LUTLabel, EVR_SH, "intensity");
+  PutCode(map, DCM_MeasurementUnitsCodeSequence, {"UCUM", "1", "no units"});
 }
 
 // A rescale slope is no part of the standard's MR image, but is what nearly all readers apply to one; with it
@@ -221,22 +133,14 @@ void PutPlane(DcmItem& set, const Grid& grid, int k) {
   Put(set, DCM_PixelRepresentation, 1);
 }
 
-std::string FileBytes(DcmFileFormat& file, size_t pixel_bytes) {
-  std::string bytes(pixel_bytes + 65536, '\0');
-  DcmOutputBufferStream out(bytes.data(), offile_off_t(bytes.size()));
-  file.transferInit();
-  Require(file.write(out, EXS_LittleEndianExplicit, EET_ExplicitLength, nullptr));
-  file.transferEnd();
-  bytes.resize(size_t(out.filled()));
-  return bytes;
-}
+std::string ImageUidOf(const Digest& content, int k) { return UidOf(content, "image", k); }
 
 std::string ImageBytes(const Grid& grid, int k, const Sint16* stored, const DicomGreys& greys,
                        const DicomSeries& series, const Digest& content) {
   DcmFileFormat file;
   DcmItem& set = *file.getDataset();
   Put(set, DCM_SOPClassUID, EVR_UI, SopClassOf(series.modality));
-  Put(set, DCM_SOPInstanceUID, EVR_UI, UidOf(content, "image", k));
+  Put(set, DCM_SOPInstanceUID, EVR_UI, ImageUidOf(content, k));
   PutOrigin(set, series, content);
   PutModality(set, series.modality);
   PutPlane(set, grid, k);
@@ -244,19 +148,14 @@ std::string ImageBytes(const Grid& grid, int k, const Sint16* stored, const Dico
   const size_t pixels = size_t(grid.size.x()) * size_t(grid.size.y());
   Require(set.putAndInsertUint16Array(DcmTag(DCM_PixelData, EVR_OW), reinterpret_cast<const Uint16*>(stored),
                                       pixels));
-  return FileBytes(file, 2 * pixels);
+  return FileBytes(file);
 }
 
 Digest ContentOf(const Volume& volume, const std::vector<Sint16>& stored, const DicomGreys& greys,
                  const DicomSeries& series) {
   Hasher hasher;
   hasher.Add(greys.step).Add(int64_t(greys.window_low)).Add(int64_t(greys.window_high));
-  hasher.Add(series.study)
-      .Add(series.world)
-      .Add(series.patient_id)
-      .Add(series.modality)
-      .Add(series.description)
-      .Add(series.comment);
+  AddOrigin(hasher, series);
   for (const double number : volume.grid.direction.reshaped()) hasher.Add(number);
   for (const double number : volume.grid.spacing_mm) hasher.Add(number);
   for (const double number : volume.grid.origin.lps) hasher.Add(number);
@@ -270,6 +169,13 @@ DicomGreys DicomGreysOf(const Scan& of_template) {
   DicomGreys greys{.step = StepOf(of_template)};
   ChooseWindow(Stored(of_template.volume, greys.step), greys);
   return greys;
+}
+
+DicomImages ImagesOf(const Volume& volume, const DicomGreys& greys, const DicomSeries& series) {
+  const Digest content = ContentOf(volume, Stored(volume, greys.step), greys, series);
+  DicomImages of{SopClassOf(series.modality), SeriesUidOf(content), {}};
+  for (int k = 0; k < volume.grid.size.z(); ++k) of.images.push_back(ImageUidOf(content, k));
+  return of;
 }
 
 void WriteDicomZip(const std::filesystem::path& path, const Volume& volume, const DicomGreys& greys,

@@ -1,5 +1,5 @@
 // Folders that go aside are not entered: they may be closed to the reader.
-#include "pipeline/io/series_folder.h"
+#include "pipeline/io/dicom/series_folder.h"
 
 #include <algorithm>
 #include <fstream>

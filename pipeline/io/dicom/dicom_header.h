@@ -14,6 +14,7 @@ struct DicomFrame {
   Eigen::Vector3d position_mm;  // LPS, centre of the first voxel
   Eigen::Vector3d along_row, along_column;
   Eigen::Vector2d spacing_mm;  // between columns, between rows
+  int segment = 0;             // of a segmentation: the number of its segment; 0 where it is not told
 };
 
 // What the numbers of a file are of. Others: doses, images of a treatment, what is said about images.
@@ -25,11 +26,12 @@ struct DicomFile {
   std::string modality;      // "MR", "CT" or ""
   bool localiser = false;    // by its own account
   DicomContent content = DicomContent::kBody;
-  size_t segments = 0;             // of a segmentation that has frames of their own for each
+  int columns = 0, rows = 0;
+  bool numbered = false;           // a segmentation whose voxels are the numbers of their segments
   size_t certain = 0;              // of a segmentation of probabilities: the value of what is sure
-  double between_mm = 0;           // of a segmentation: from plane to plane, where it says so
-  bool of_bits = false;            // a segmentation of one bit a voxel, which the decoder gives as 0 or 255
+  double between_mm = 0;           // from plane to plane, where it says so
   std::vector<DicomFrame> frames;  // in the file's order; none where it does not say where they lie
+  bool miscounted = false;         // says where another number of frames lie than it has
   Rescale rescale;                 // of all frames, by the file's word
   bool coloured = false;           // by a palette or by three values a voxel
   bool of_known_kind = true;       // the decoder reads images of its SOP class

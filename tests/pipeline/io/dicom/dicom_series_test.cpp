@@ -313,57 +313,6 @@ TEST(DicomSeries, AnImageWhoseFramesAreRescaledDifferentlyIsRefused) {
   EXPECT_THAT(complaint("1"), testing::Not(HasSubstr("rescaled differently")));
 }
 
-std::string ComplaintOfLabels(const std::filesystem::path& path) {
-  return RefusalOf<InputError>([&] { ReadLabels(path); }, "none");
-}
-
-TEST(DicomSeries, ASegmentationIsALabelMapAndNoScan) {
-  const ScratchFolder folder;
-  WriteSegmentation(folder.path() / "one.dcm", 1);
-  WriteSegmentation(folder.path() / "four.dcm", 4);
-  const LabelMap labels = ReadLabels(folder.path() / "one.dcm");
-  ASSERT_EQ(labels.grid.size, Eigen::Vector3i(8, 8, 3));
-  EXPECT_EQ(ReadLabelsGrid(folder.path() / "one.dcm"), labels.grid);
-  EXPECT_EQ(std::count(labels.values.begin(), labels.values.end(), 1), 3 * 5);
-  EXPECT_EQ(std::count(labels.values.begin(), labels.values.end(), 0), 3 * 59);
-  EXPECT_EQ(labels(0, 0, 1), 1);
-  EXPECT_THAT(ComplaintOfLabels(folder.path() / "four.dcm"), HasSubstr("(SEG) holds 4 segments"));
-  for (const char* name : {"one.dcm", "four.dcm"}) {
-    EXPECT_THAT(Complaint(folder.path() / name), HasSubstr("a segmentation (SEG) and no scan")) << name;
-    EXPECT_THROW(ReadVolumeInfo(folder.path() / name), InputError) << name;
-  }
-}
-
-// Programs leave out the planes in which a segment has nothing.
-TEST(DicomSeries, PlanesThatASegmentationLeavesOutAreEmpty) {
-  const ScratchFolder folder;
-  const std::filesystem::path file = folder.path() / "seg.dcm";
-  WriteSegmentation(file, {.places = {4, 5, 8}});
-  const LabelMap labels = ReadLabels(file);
-  ASSERT_EQ(labels.grid.size, Eigen::Vector3i(8, 8, 5));
-  EXPECT_EQ(ReadLabelsGrid(file), labels.grid);
-  EXPECT_NEAR(labels.grid.spacing_mm.z(), 1, 1e-9);
-  for (int plane = 0; plane < 5; ++plane) EXPECT_EQ(labels(0, 0, plane), plane < 2 || plane == 4) << plane;
-  WriteSegmentation(file, {.places = {4, 8}});
-  EXPECT_EQ(ReadLabels(file).grid.spacing_mm.z(), 4);
-  WriteSegmentation(file, {.places = {4, 8}, .between = "2"});
-  EXPECT_EQ(ReadLabels(file).grid.size.z(), 3) << "its own word";
-  WriteSegmentation(file, {.places = {0, 4, 10}});
-  EXPECT_THAT(ComplaintOfLabels(file), HasSubstr("unevenly spaced"));
-}
-
-TEST(DicomSeries, AProbabilityIsInsideFromAHalfOn) {
-  const ScratchFolder folder;
-  for (const uint16_t certain : {1, 100, 255}) {
-    WriteSegmentation(folder.path() / "seg.dcm", {.certain = certain});
-    const LabelMap labels = ReadLabels(folder.path() / "seg.dcm");
-    EXPECT_EQ(labels(0, 0, 1), 1) << certain;
-    EXPECT_EQ(labels(1, 0, 1), 1) << certain;
-    EXPECT_EQ(labels(2, 0, 1), 0) << certain;
-    EXPECT_EQ(labels(0, 1, 1), 0) << certain;
-  }
-}
-
 TEST(DicomSeries, WhatIsNotOfTheBodyBesideAScanDoesNotCount) {
   const ScratchFolder folder;
   for (int slice = 0; slice < 3; ++slice)
@@ -372,7 +321,7 @@ TEST(DicomSeries, WhatIsNotOfTheBodyBesideAScanDoesNotCount) {
   WriteSegmentation(folder.path() / "four.dcm", 4);
   EXPECT_EQ(ReadScan(folder.path()).volume.grid.size, Eigen::Vector3i(2, 2, 3));
   EXPECT_EQ(ReadVolumeInfo(folder.path()).grid.size, Eigen::Vector3i(2, 2, 3));
-  std::filesystem::remove(folder.path() / "four.dcm");  // of the same series
+  std::filesystem::remove(folder.path() / "four.dcm");  // of the same series, and the same places
   EXPECT_EQ(ReadLabels(folder.path()).grid.size, Eigen::Vector3i(8, 8, 3)) << "the segmentation is meant";
   if (!HasSharedData()) GTEST_SKIP() << "no shared data here";
   std::filesystem::remove(folder.path() / "one.dcm");

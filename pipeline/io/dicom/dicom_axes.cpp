@@ -1,6 +1,6 @@
 // An entry that is off by r turns neither axis by more than sqrt(3) r, nor their normal by more than
 // sqrt(6) r; lengths and angles of two such axes are off by 2 sqrt(3) r at most.
-#include "pipeline/io/dicom_axes.h"
+#include "pipeline/io/dicom/dicom_axes.h"
 
 #include <Eigen/SVD>
 #include <cmath>

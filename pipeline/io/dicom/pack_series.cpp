@@ -1,5 +1,5 @@
 // What is broken is packed too: whoever reads the series says so.
-#include "pipeline/io/pack_series.h"
+#include "pipeline/io/dicom/pack_series.h"
 
 #include <archive.h>
 #include <archive_entry.h>
@@ -9,7 +9,7 @@
 #include <memory>
 
 #include "core/errors.h"
-#include "pipeline/io/series_folder.h"
+#include "pipeline/io/dicom/series_folder.h"
 
 namespace kvx {
 namespace {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/errors.h"
-#include "pipeline/io/dicom_header.h"
+#include "pipeline/io/dicom/dicom_header.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/dicom_bytes.h"
 #include "tests/support/fixtures.h"

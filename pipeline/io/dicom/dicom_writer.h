@@ -2,9 +2,10 @@
 #pragma once
 #include <filesystem>
 #include <string>
+#include <vector>
 
-#include "core/digest.h"
 #include "core/scan.h"
+#include "pipeline/io/dicom/dicom_origin.h"
 
 namespace kvx {
 
@@ -19,21 +20,18 @@ struct DicomGreys {
 // template's. Throws InputError for values that are not finite.
 DicomGreys DicomGreysOf(const Scan& of_template);
 
-struct DicomSeries {
-  std::string modality;     // MR or CT; anything else makes secondary capture images of modality OT
-  std::string patient_id;   // our id of the subject; the patient's name stays empty
-  Digest study;             // of a patient, equal digests: the same study
-  Digest world;             // of a patient, equal digests: the same frame of reference
-  std::string description;  // ASCII, at most 64 letters
-  std::string comment;      // ASCII, at most 10240 letters
+// The identifiers (UIDs) of what WriteDicomZip writes.
+struct DicomImages {
+  std::string sop_class, series;
+  std::vector<std::string> images;  // of each plane k
 };
+DicomImages ImagesOf(const Volume& volume, const DicomGreys& greys, const DicomSeries& series);
 
 // Writes a zip with one image per plane k of the grid. World is DICOM's own, LPS mm: positions, orientation
 // and spacing are the grid's. Values become the nearest multiple of the step, which the file states as
 // rescale slope (for MR as real world value map too, and as neither where it is 1). Every UID and the series'
-// number are derived from the content: the same volume gives the same bytes. Nothing of a scan's own header
-// is in it but its modality, and it says so (patient identity removed). Throws InputError for values that are
-// not finite, Unavailable when the file cannot be written.
+// number are derived from the content: the same volume gives the same bytes. Throws InputError for values
+// that are not finite, Unavailable when the file cannot be written.
 void WriteDicomZip(const std::filesystem::path& path, const Volume& volume, const DicomGreys& greys,
                    const DicomSeries& series);
 

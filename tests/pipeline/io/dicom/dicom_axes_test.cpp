@@ -1,5 +1,5 @@
 // Axes of a series whose header rounds its direction cosines, against those that it was made of.
-#include "pipeline/io/dicom_axes.h"
+#include "pipeline/io/dicom/dicom_axes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,21 +1,20 @@
 // Tags by GDCM, read up to the pixel data. Frames of an enhanced image carry their place in functional
 // groups.
-#include "pipeline/io/dicom_header.h"
+#include "pipeline/io/dicom/dicom_header.h"
 
 #include <gdcmMediaStorage.h>
 #include <gdcmReader.h>
-#include <gdcmSequenceOfItems.h>
 #include <gdcmTrace.h>
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <set>
 
 #include "core/errors.h"
-#include "pipeline/io/series_folder.h"
+#include "pipeline/io/dicom/dicom_tags.h"
+#include "pipeline/io/dicom/series_folder.h"
 
 namespace kvx {
 namespace {
@@ -33,7 +32,7 @@ const Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kIntercept(0x
 const Tag kFloatPixels(0x7fe0, 0x0008), kDoublePixels(0x7fe0, 0x0009);  // of parametric maps alone
 const Tag kSopClass(0x0008, 0x0016), kSegmentSequence(0x0062, 0x0002), kSegmentationType(0x0062, 0x0001),
     kMostFraction(0x0062, 0x000e), kSpacingBetween(0x0018, 0x0088);
-const Tag kSharedGroups(0x5200, 0x9229), kFrameGroups(0x5200, 0x9230);
+const Tag kSegmentOfFrame(0x0062, 0x000a), kSegmentReferred(0x0062, 0x000b), kSegmentNumber(0x0062, 0x0004);
 const Tag kPlanePosition(0x0020, 0x9113), kPlaneOrientation(0x0020, 0x9116), kPixelMeasures(0x0028, 0x9110);
 const Tag kPixelValues(0x0028, 0x9145), kModalityTable(0x0028, 0x3000);
 
@@ -55,74 +54,6 @@ const char kUnknownPacking[] =
 const char kInverted[] =
     "the DICOM images are shown inverted (MONOCHROME1) and stored in a way that is not read here; convert "
     "them to NIfTI (dcm2niix) or to MONOCHROME2";
-
-std::string TextOf(const DataSet& set, const Tag& tag) {
-  if (!set.FindDataElement(tag)) return "";
-  const gdcm::ByteValue* bytes = set.GetDataElement(tag).GetByteValue();
-  if (!bytes) return "";
-  std::string text(bytes->GetPointer(), bytes->GetLength());
-  text.erase(std::remove(text.begin(), text.end(), '\0'), text.end());
-  const size_t first = text.find_first_not_of(' ');
-  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(' ') - first + 1);
-}
-
-// Decimal strings separated by backslashes; nothing unless there are `count` finite ones.
-std::optional<std::vector<double>> Numbers(const std::string& text, size_t count) {
-  std::vector<double> numbers;
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  while (at < end) {
-    while (at < end && (*at == ' ' || *at == '+')) ++at;
-    double number = 0;
-    const auto [next, error] = std::from_chars(at, end, number);
-    if (error != std::errc() || !std::isfinite(number)) return std::nullopt;
-    numbers.push_back(number);
-    at = next;
-    while (at < end && *at == ' ') ++at;
-    if (at < end && *at++ != '\\') return std::nullopt;
-  }
-  if (numbers.size() != count) return std::nullopt;
-  return numbers;
-}
-
-// The items of a sequence, none where it is absent.
-std::vector<const DataSet*> ItemsOf(const DataSet& set, const Tag& tag,
-                                    std::vector<gdcm::SmartPointer<gdcm::SequenceOfItems>>& alive) {
-  std::vector<const DataSet*> items;
-  if (!set.FindDataElement(tag)) return items;
-  const gdcm::SmartPointer<gdcm::SequenceOfItems> sequence = set.GetDataElement(tag).GetValueAsSQ();
-  if (!sequence) return items;
-  alive.push_back(sequence);
-  for (size_t i = 1; i <= sequence->GetNumberOfItems(); ++i)
-    items.push_back(&sequence->GetItem(i).GetNestedDataSet());
-  return items;
-}
-
-// Looks a value up where it may stand: in the frame's own groups, in the shared ones, or at the top of a
-// plain image.
-class FrameTags {
- public:
-  explicit FrameTags(const DataSet& top) : top_(top) {
-    const auto shared = ItemsOf(top, kSharedGroups, alive_);
-    shared_ = shared.empty() ? nullptr : shared.front();
-    frames_ = ItemsOf(top, kFrameGroups, alive_);
-  }
-  size_t frame_count() const { return frames_.size(); }
-  std::string Text(size_t frame, const Tag& group, const Tag& tag) {
-    for (const DataSet* groups : {frame < frames_.size() ? frames_[frame] : nullptr, shared_}) {
-      if (!groups) continue;
-      const auto items = ItemsOf(*groups, group, alive_);
-      if (!items.empty() && items.front()->FindDataElement(tag)) return TextOf(*items.front(), tag);
-    }
-    return TextOf(top_, tag);
-  }
-
- private:
-  const DataSet& top_;
-  std::vector<gdcm::SmartPointer<gdcm::SequenceOfItems>> alive_;  // items point into these
-  const DataSet* shared_ = nullptr;
-  std::vector<const DataSet*> frames_;
-};
 
 std::optional<DicomFrame> FrameOf(FrameTags& tags, size_t frame) {
   const auto position = Numbers(tags.Text(frame, kPlanePosition, kPosition), 3);
@@ -165,6 +96,7 @@ Rescale RescaleOf(FrameTags& tags, size_t frame) {
 void ReadFrames(const DataSet& set, DicomFile& file) {
   FrameTags tags(set);
   const size_t count = DeclaredFrames(set);
+  file.miscounted = tags.frame_count() > 0 && tags.frame_count() != count;
   if (count > 1 && tags.frame_count() != count) return;
   std::vector<DicomFrame> frames;
   std::set<std::pair<double, double>> rescales;
@@ -199,19 +131,6 @@ bool HasSoundMeta(std::string_view head) {
   return false;
 }
 
-bool HasNumber(const DataSet& set, const Tag& tag) {
-  if (!set.FindDataElement(tag)) return false;
-  const gdcm::ByteValue* bytes = set.GetDataElement(tag).GetByteValue();
-  return bytes && bytes->GetLength() >= 2;
-}
-
-size_t NumberAt(const DataSet& set, const Tag& tag) {
-  if (!HasNumber(set, tag)) return 0;
-  const gdcm::ByteValue* bytes = set.GetDataElement(tag).GetByteValue();
-  return size_t(uint8_t(bytes->GetPointer()[0])) | size_t(uint8_t(bytes->GetPointer()[1]))
-                                                       << 8;  // GDCM swaps while reading
-}
-
 // Without it GDCM takes the lowest bit for the highest, and makes every voxel 0 or 1. Values that do not
 // begin at the lowest bit (PS3.5, 8.1.1 forbids them now) it leaves where they are, many times too large.
 void RequireHighBit(const DataSet& set) {
@@ -229,7 +148,7 @@ void RequireHighBit(const DataSet& set) {
 
 // GDCM gives the numbers of the table's entries.
 void RequireNoTable(const DataSet& set) {
-  std::vector<gdcm::SmartPointer<gdcm::SequenceOfItems>> alive;
+  DicomSequences alive;
   if (ItemsOf(set, kModalityTable, alive).empty()) return;
   throw InputError(
       "what the greys of the DICOM images mean stands in a table (modality LUT), which is not read here; "
@@ -307,11 +226,19 @@ DicomContent ContentOf(const DataSet& set) {
   return other ? DicomContent::kOther : DicomContent::kBody;
 }
 
-// A label map has its segments in the same frames, by number.
-size_t SegmentsApart(const DataSet& set) {
-  if (TextOf(set, kSopClass) == kLabelMap) return 0;
-  std::vector<gdcm::SmartPointer<gdcm::SequenceOfItems>> alive;
-  return ItemsOf(set, kSegmentSequence, alive).size();
+void ReadSegments(const DataSet& set, DicomFile& file) {
+  file.numbered = TextOf(set, kSopClass) == kLabelMap || TextOf(set, kSegmentationType) == "LABELMAP";
+  if (file.numbered) return;
+  if (TextOf(set, kSegmentationType) == "FRACTIONAL")
+    file.certain = std::max<size_t>(1, NumberAt(set, kMostFraction));
+  DicomSequences alive;
+  const auto segments = ItemsOf(set, kSegmentSequence, alive);
+  const size_t only = segments.size() == 1 ? std::max<size_t>(1, NumberAt(*segments[0], kSegmentNumber)) : 0;
+  FrameTags tags(set);
+  for (size_t f = 0; f < file.frames.size(); ++f) {
+    const size_t segment = tags.Number(f, kSegmentOfFrame, kSegmentReferred);
+    file.frames[f].segment = int(segment > 0 ? segment : only);
+  }
 }
 
 // Leaves `in` where the voxels begin, which it does not read.
@@ -364,17 +291,15 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
                  modality == "MR" || modality == "CT" ? modality : "",
                  TextOf(set, kImageType).find("LOCALIZER") != std::string::npos,
                  content,
-                 content == DicomContent::kSegments ? SegmentsApart(set) : 0,
-                 {}};
-  if (content == DicomContent::kSegments && TextOf(set, kSegmentationType) == "FRACTIONAL")
-    file.certain = std::max<size_t>(1, NumberAt(set, kMostFraction));
-  file.of_bits = content == DicomContent::kSegments && NumberAt(set, kBitsAllocated) == 1;
+                 int(NumberAt(set, kColumns)),
+                 int(NumberAt(set, kRows))};
   if (content == DicomContent::kOther) return file;  // nobody reads its voxels
   file.of_known_kind = IsOfKnownKind(set);
   file.coloured = IsColour(TextOf(set, kShown));
   RequireHighBit(set);
   RequireNoTable(set);
   ReadFrames(set, file);
+  if (content == DicomContent::kSegments) ReadSegments(set, file);
   file.inverted_from = InvertedFrom(set);
   if (file.inverted_from) RequireInvertedAsStored(reader.GetFile(), in);
   RequireAllVoxels(reader.GetFile(), in, file.frames.size());

@@ -1,5 +1,5 @@
 // What is written comes back through our own reader and passes the validator of dicom3tools.
-#include "pipeline/io/dicom_writer.h"
+#include "pipeline/io/dicom/dicom_writer.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

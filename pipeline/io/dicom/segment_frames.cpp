@@ -1,0 +1,84 @@
+// By GDCM, whose reader of images does not know segmentations of numbers: it is told what they are.
+#include "pipeline/io/dicom/segment_frames.h"
+
+#include <gdcmMediaStorage.h>
+#include <gdcmPixmapReader.h>
+#include <gdcmTrace.h>
+
+#include <fstream>
+
+#include "core/errors.h"
+#include "pipeline/io/dicom/dicom_tags.h"
+
+namespace kvx {
+namespace {
+
+constexpr double kMostBytes = 8e9;
+const gdcm::Tag kBitsAllocated(0x0028, 0x0100), kPixelData(0x7fe0, 0x0010);
+const char kUndecoded[] =
+    "the voxels of the DICOM segmentation (SEG) are damaged, or packed in a way that is not read here; save "
+    "it again, uncompressed (Explicit VR Little Endian), or as a label map (.nii.gz, .nrrd)";
+
+class SegmentationReader : public gdcm::PixmapReader {
+ public:
+  bool Read() override { return gdcm::Reader::Read(); }
+  bool Decode() { return ReadImageInternal(gdcm::MediaStorage::SegmentationStorage); }
+};
+
+std::string Decoded(SegmentationReader& reader, double bytes) {
+  if (!(bytes < kMostBytes)) {
+    throw InputError(
+        "the DICOM segmentation (SEG) is too large as it is packed; save it uncompressed (Explicit VR Little "
+        "Endian), or as a label map (.nii.gz, .nrrd)");
+  }
+  if (!reader.Decode()) throw InputError(kUndecoded);
+  std::string voxels(reader.GetPixmap().GetBufferLength(), '\0');
+  if (double(voxels.size()) < bytes || !reader.GetPixmap().GetBuffer(voxels.data()))
+    throw InputError(kUndecoded);
+  return voxels;
+}
+
+std::string Stored(SegmentationReader& reader, double bytes) {
+  const gdcm::ByteValue* value = reader.GetFile().GetDataSet().GetDataElement(kPixelData).GetByteValue();
+  if (!value || double(value->GetLength()) < bytes) throw InputError(kUndecoded);
+  return {value->GetPointer(), value->GetLength()};
+}
+
+}  // namespace
+
+SegmentFrames::SegmentFrames(const DicomFile& file) : voxels_(size_t(file.columns) * size_t(file.rows)) {
+  gdcm::Trace::DebugOff(), gdcm::Trace::WarningOff(), gdcm::Trace::ErrorOff();
+  std::ifstream in(file.path, std::ios::binary);
+  SegmentationReader reader;
+  reader.SetStream(in);
+  try {
+    if (!reader.Read()) throw InputError(kUndecoded);
+    const gdcm::TransferSyntax& syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
+    bits_ = NumberAt(reader.GetFile().GetDataSet(), kBitsAllocated);
+    const bool packed = syntax.IsEncapsulated();
+    if (syntax.GetSwapCode() == gdcm::SwapCode::BigEndian || (packed && bits_ == 1) ||
+        (bits_ != 1 && bits_ != 8 && bits_ != 16))
+      throw InputError(kUndecoded);
+    const double bytes = std::ceil(double(voxels_) * double(file.frames.size()) * double(bits_) / 8);
+    stored_ = packed ? Decoded(reader, bytes) : Stored(reader, bytes);
+  } catch (const InputError&) {
+    throw;
+  } catch (const std::exception&) {  // GDCM's words quote tags
+    throw InputError(kUndecoded);
+  }
+}
+
+std::vector<uint16_t> SegmentFrames::Frame(size_t frame) const {
+  std::vector<uint16_t> values(voxels_);
+  const auto byte = [&](size_t at) { return uint16_t(uint8_t(stored_[at])); };
+  for (size_t v = 0; v < voxels_; ++v) {
+    const size_t at = frame * voxels_ + v;
+    if (bits_ == 1)
+      values[v] = byte(at / 8) >> (at % 8) & 1;
+    else
+      values[v] = bits_ == 8 ? byte(at) : uint16_t(byte(2 * at) | byte(2 * at + 1) << 8);
+  }
+  return values;
+}
+
+}  // namespace kvx

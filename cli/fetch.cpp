@@ -24,19 +24,20 @@ struct FetchArguments {
   std::filesystem::path out;
 };
 
-std::string FormatOf(const std::filesystem::path& out) {
+std::string FormatOf(const std::filesystem::path& out, bool label) {
   for (const char* format : {"nii.gz", "nii", "nrrd", "mha", "raw"}) {
     if (HasExtension(out, std::string(".") + format)) return format;
   }
-  if (HasExtension(out, ".zip")) return "dicom";
-  throw InputError(
-      "--out must end in .nii.gz, .nii, .nrrd, .mha, .raw or .zip (DICOM): the extension chooses the format");
+  const std::string dicom = label ? ".dcm" : ".zip";
+  if (HasExtension(out, dicom)) return "dicom";
+  throw InputError("--out must end in .nii.gz, .nii, .nrrd, .mha, .raw or " + dicom +
+                   " (DICOM): the extension chooses the format");
 }
 
 std::string PathOf(const FetchArguments& arguments) {
   std::string path = "/v1/models/" + UrlEncoded(arguments.model) +
-                     "/volume?format=" + FormatOf(arguments.out) + "&mode=" + arguments.pose.mode +
-                     "&level=" + std::to_string(arguments.level);
+                     "/volume?format=" + FormatOf(arguments.out, arguments.label) +
+                     "&mode=" + arguments.pose.mode + "&level=" + std::to_string(arguments.level);
   if (arguments.label) path += "&label=true";
   if (!arguments.modality.empty()) path += "&modality=" + arguments.modality;
   if (!arguments.pose.scan.empty()) path += "&scan=" + UrlEncoded(arguments.pose.scan);
@@ -125,7 +126,7 @@ void AddFetch(CLI::App& program, CommandContext& context) {
   AddModality(*command, arguments->modality);
   AddOut(*command, arguments->out,
          "File to write (.nii.gz, .nii, .nrrd, .mha; .raw: voxels alone, whose geometry is told; .zip: a "
-         "DICOM series)");
+         "DICOM series; with --label .dcm: a DICOM segmentation of that series)");
   AddQuiet(*command, context);
   AddJson(*command, context);
   command->footer("Example:\n  kinevox fetch mdl_7k2... --joint tibia.flexion=35 --out bent.nii.gz");

@@ -65,7 +65,7 @@ void RequireMapOut(const PoseArguments& arguments) {
 
 void RequireFitting(const PoseArguments& arguments) {
   if (arguments.label)
-    RequireVolumeOr(".dcm", "a DICOM segmentation (SEG); else", arguments.out);
+    RequireVolumeOr(".dcm", "a DICOM segmentation (SEG); for a plain label map", arguments.out);
   else
     RequireVolumeOr(".zip", "a DICOM series; for one file", arguments.out);
   RequireMayWrite(arguments.out);

@@ -3,6 +3,6 @@
 
 namespace kvx {
 
-const char* ProgramVersion();  // "0.94.0"
+const char* ProgramVersion();  // "0.95.0"
 
 }  // namespace kvx

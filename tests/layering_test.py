@@ -49,6 +49,7 @@ LINES = {
     ),
     "cli": ("commands.h", "terminal", "options", "service", "*"),
     "pipeline": PIPELINE_LINES,
+    "pipeline/io": ("atomic_file.h itk_image.h layered_labels.h volume_info.h voxel_values.h zip_file.h", "dicom", "*"),
     "pipeline/segmentation": ("cuts strokes names", "mr ct"),
     "pipeline/segmentation/mr": ("levels shells", "search"),
     "pipeline/bones": ("images bone_set", "template", "refine", "judge", "search"),
@@ -58,7 +59,8 @@ LINES = {
 # Slow or foreign headers that only one folder may see.
 ONLY_IN = {
     r"itk\w*\.h": "pipeline/io/ tests/bench/itk_warp.cpp",
-    r"(gdcm\w*|png|tiny_gltf)\.h|dcmtk/.*": "pipeline/io/ tests/",
+    r"gdcm\w*\.h|dcmtk/.*": "pipeline/io/dicom/ tests/",
+    r"(png|tiny_gltf)\.h": "pipeline/io/ tests/",
     r"httplib\.h": "server/ cli/ tests/",
     r"SQLiteCpp/.*": "storage/ tests/",
     r"archive\w*\.h": "storage/ pipeline/io/ tests/",

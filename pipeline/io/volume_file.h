@@ -6,14 +6,9 @@
 
 #include "core/scan.h"
 #include "pipeline/io/layered_labels.h"
+#include "pipeline/io/volume_info.h"
 
 namespace kvx {
-
-struct VolumeInfo {
-  Grid grid;
-  ScalarType stored_as = ScalarType::kFloat32;
-  std::string modality;
-};
 
 // `path` is a .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd file, a .dcm of many frames or a folder with one DICOM
 // series. Any integer or float type; rescale slope and intercept are applied, lengths become mm whatever unit

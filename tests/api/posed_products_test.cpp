@@ -150,7 +150,10 @@ TEST(Posing, ADicomSeriesIsOfOurIdsAndSaysItsModality) {
   EXPECT_EQ(GetVolume(w.services, model, {{"scan", "pose01"}, {"format", "nrrd"}}, "", "").etag,
             GetVolume(w.services, model, {{"format", "nrrd"}}, "", "").etag);
   EXPECT_THAT(RefusalOf([&] { series({{"modality", "US"}}); }), testing::HasSubstr("MR or CT"));
-  EXPECT_THAT(RefusalOf([&] { series({{"label", "true"}}); }), testing::HasSubstr("labels"));
+  const FileAnswer bones = series({{"label", "true"}});
+  EXPECT_EQ(bones.content_type, "application/dicom");
+  EXPECT_THAT(bones.filename, testing::MatchesRegex(model + "\\.[0-9a-f]+\\.dcm"));
+  EXPECT_NE(bones.etag, series({}).etag);
   EXPECT_THAT(RefusalOf([&] {
                 GetVolume(w.services, model, {{"modality", "MR"}}, "", "");
               }),

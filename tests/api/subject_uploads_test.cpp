@@ -107,7 +107,7 @@ TEST(Uploads, ADicomImageMayBeAScanOrALabelMap) {
   };
   EXPECT_THROW(bones("b.zip"), InputError);
   Upload segmentation = bones("b.dcm");
-  segmentation.Write(std::string("LABELS"));
+  segmentation.Write(std::string("VOXELS"));
   const Json made = Json::parse(segmentation.Finish().body);
   EXPECT_EQ(w.catalogue.RequireBones(made["id"]).file.suffix, ".dcm");
 }

@@ -10,9 +10,8 @@
 #include <sstream>
 
 #include "pipeline/io/volume_file.h"
-#include "tests/support/dicom_element.h"
 #include "tests/support/fixtures.h"
-#include "tests/support/hinge_study.h"
+#include "tests/support/hinge_model_test.h"
 #include "tests/support/program.h"
 
 namespace kvx {
@@ -24,24 +23,12 @@ using testing_support::Ended;
 using testing_support::RunProgram;
 using testing_support::ScratchFolder;
 
-class Products : public testing::Test {
+class Products : public testing_support::HingeModelTest {
  protected:
   static void SetUpTestSuite() {
-    scratch_ = new ScratchFolder;
-    testing_support::WriteHingeStudy(scratch_->path());
-    const Ended built = Run({"build", At("study.json"), "--out", At("model"), "--quiet"});
-    ASSERT_EQ(built.code, 0) << built.err;
+    HingeModelTest::SetUpTestSuite();
     std::ofstream(At("bend.json"))
         << R"({"fps": 4, "frames": [{"time": 0, "joints": {}}, {"time": 0.5, "joints": {"lower.flexion": 30}}]})";
-  }
-  static void TearDownTestSuite() { delete scratch_; }
-  static std::string At(const std::string& name) { return (scratch_->path() / name).string(); }
-  static Ended Run(const std::vector<std::string>& arguments) {
-    return RunProgram(scratch_->path(), arguments);
-  }
-  static void ExpectDone(const std::vector<std::string>& arguments) {
-    const Ended ended = Run(arguments);
-    EXPECT_EQ(ended.code, 0) << arguments[0] << ": " << ended.err;
   }
   static std::string Start(const std::string& name, size_t bytes) {
     std::ifstream file(At(name), std::ios::binary);
@@ -49,9 +36,7 @@ class Products : public testing::Test {
     file.read(start.data(), std::streamsize(bytes));
     return start;
   }
-  static ScratchFolder* scratch_;
 };
-ScratchFolder* Products::scratch_ = nullptr;
 
 TEST_F(Products, SlicesArePicturesOrLayers) {
   ExpectDone(
@@ -150,43 +135,6 @@ TEST_F(Products, RefusalsNameTheOption) {
               HasSubstr("--extrapolation-map: "));
   EXPECT_FALSE(std::filesystem::exists(At("x.nrrd")));
   EXPECT_THAT(refusal({"surface", "--bone", "nope", "--out", At("x.stl")}, 5), HasSubstr("upper, lower"));
-}
-
-TEST_F(Products, ADicomSeriesIsThePosedVolume) {
-  ExpectDone({"pose", At("model"), "--scan", "pose01", "--modality", "MR", "--out", At("series.zip")});
-  ExpectDone({"pose", At("model"), "--scan", "pose01", "--out", At("posed.nrrd")});
-  const std::string unzip = "/usr/bin/python3 -m zipfile -e " + At("series.zip") + " " + At("series");
-  ASSERT_EQ(std::system(unzip.c_str()), 0);
-  const Scan series = ReadScan(At("series")), posed = ReadScan(At("posed.nrrd"));
-  EXPECT_EQ(series.modality, "MR");
-  ASSERT_TRUE(series.volume.grid == posed.volume.grid);
-  EXPECT_EQ(series.volume.values, posed.volume.values);
-  EXPECT_EQ(Run({"pose", At("model"), "--scan", "pose01", "--label", "--out", At("x.zip")}).code, 2);
-  EXPECT_EQ(Run({"pose", At("model"), "--scan", "pose01", "--modality", "MR", "--out", At("x.nrrd")}).code,
-            2);
-}
-
-// By angles the template's frame of reference, as in a scan that scan's; one grey scale throughout.
-TEST_F(Products, DicomSeriesOfAModelShareWhatTheyHaveInCommon) {
-  const auto image_of = [](const std::string& name, std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {"pose", At("model")});
-    arguments.insert(arguments.end(), {"--modality", "MR", "--out", At(name + ".zip")});
-    ExpectDone(arguments);
-    const std::string unzip = "/usr/bin/python3 -m zipfile -e " + At(name + ".zip") + " " + At(name);
-    EXPECT_EQ(std::system(unzip.c_str()), 0);
-    return std::filesystem::path(At(name)) / "image00001.dcm";
-  };
-  const auto still = image_of("still", {"--joint", "lower.flexion=0"}),
-             bent = image_of("bent", {"--joint", "lower.flexion=20", "--level", "1"}),
-             as_in_scan = image_of("as_in_scan", {"--scan", "pose01"});
-  const auto frame = [](const auto& image) { return testing_support::ElementOf(image, 0x0020, 0x0052); };
-  const auto width = [](const auto& image) { return testing_support::ElementOf(image, 0x0028, 0x1051); };
-  EXPECT_NE(frame(still), "");
-  EXPECT_EQ(frame(bent), frame(still));
-  EXPECT_NE(frame(as_in_scan), frame(still));
-  EXPECT_NE(width(still), "");
-  EXPECT_EQ(width(bent), width(still));
-  EXPECT_EQ(width(as_in_scan), width(still));
 }
 
 TEST_F(Products, InfoTellsWhatTheBuildDoubted) {

@@ -42,7 +42,7 @@ void PutOrigin(DcmItem& set, const DicomSeries& series, const Digest& content) {
   Put(set, DCM_SeriesInstanceUID, EVR_UI, SeriesUidOf(content));
   Put(set, DCM_SeriesNumber, EVR_IS, std::to_string(SeriesNumberOf(content)));
   Put(set, DCM_SeriesDescription, EVR_LO, series.description);
-  Put(set, DCM_Laterality, EVR_CS, "");
+  if (series.modality != "SEG") Put(set, DCM_Laterality, EVR_CS, "");
   Put(set, DCM_PatientPosition, EVR_CS, "");
   Put(set, DCM_FrameOfReferenceUID, EVR_UI, UidOf(series, series.world, "frame of reference"));
   Put(set, DCM_PositionReferenceIndicator, EVR_LO, "");

@@ -2,7 +2,7 @@
 #pragma once
 #include <filesystem>
 
-#include "pipeline/io/volume_file.h"
+#include "pipeline/io/volume_info.h"
 
 namespace kvx {
 

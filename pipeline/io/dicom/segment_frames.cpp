@@ -1,10 +1,12 @@
-// By GDCM, whose reader of images does not know segmentations of numbers: it is told what they are.
+// By GDCM, but for its reader of images: that knows no segmentations of numbers, and ends the process where
+// the table of their colours is not as it expects.
 #include "pipeline/io/dicom/segment_frames.h"
 
-#include <gdcmMediaStorage.h>
-#include <gdcmPixmapReader.h>
+#include <gdcmPixmap.h>
+#include <gdcmReader.h>
 #include <gdcmTrace.h>
 
+#include <cmath>
 #include <fstream>
 
 #include "core/errors.h"
@@ -19,27 +21,30 @@ const char kUndecoded[] =
     "the voxels of the DICOM segmentation (SEG) are damaged, or packed in a way that is not read here; save "
     "it again, uncompressed (Explicit VR Little Endian), or as a label map (.nii.gz, .nrrd)";
 
-class SegmentationReader : public gdcm::PixmapReader {
- public:
-  bool Read() override { return gdcm::Reader::Read(); }
-  bool Decode() { return ReadImageInternal(gdcm::MediaStorage::SegmentationStorage); }
-};
-
-std::string Decoded(SegmentationReader& reader, double bytes) {
+// As grey values, whatever colours they are shown in.
+std::string Decoded(const gdcm::File& file, const DicomFile& of, size_t bits, double bytes) {
   if (!(bytes < kMostBytes)) {
     throw InputError(
         "the DICOM segmentation (SEG) is too large as it is packed; save it uncompressed (Explicit VR Little "
         "Endian), or as a label map (.nii.gz, .nrrd)");
   }
-  if (!reader.Decode()) throw InputError(kUndecoded);
-  std::string voxels(reader.GetPixmap().GetBufferLength(), '\0');
-  if (double(voxels.size()) < bytes || !reader.GetPixmap().GetBuffer(voxels.data()))
-    throw InputError(kUndecoded);
+  gdcm::Pixmap packed;
+  packed.SetNumberOfDimensions(3);
+  packed.SetDimension(0, unsigned(of.columns));
+  packed.SetDimension(1, unsigned(of.rows));
+  packed.SetDimension(2, unsigned(of.frames.size()));
+  const auto depth = uint16_t(bits);
+  packed.SetPixelFormat(gdcm::PixelFormat(1, depth, depth, uint16_t(depth - 1), 0));
+  packed.SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
+  packed.SetTransferSyntax(file.GetHeader().GetDataSetTransferSyntax());
+  packed.SetDataElement(file.GetDataSet().GetDataElement(kPixelData));
+  std::string voxels(packed.GetBufferLength(), '\0');
+  if (double(voxels.size()) < bytes || !packed.GetBuffer(voxels.data())) throw InputError(kUndecoded);
   return voxels;
 }
 
-std::string Stored(SegmentationReader& reader, double bytes) {
-  const gdcm::ByteValue* value = reader.GetFile().GetDataSet().GetDataElement(kPixelData).GetByteValue();
+std::string Stored(const gdcm::File& file, double bytes) {
+  const gdcm::ByteValue* value = file.GetDataSet().GetDataElement(kPixelData).GetByteValue();
   if (!value || double(value->GetLength()) < bytes) throw InputError(kUndecoded);
   return {value->GetPointer(), value->GetLength()};
 }
@@ -49,7 +54,7 @@ std::string Stored(SegmentationReader& reader, double bytes) {
 SegmentFrames::SegmentFrames(const DicomFile& file) : voxels_(size_t(file.columns) * size_t(file.rows)) {
   gdcm::Trace::DebugOff(), gdcm::Trace::WarningOff(), gdcm::Trace::ErrorOff();
   std::ifstream in(file.path, std::ios::binary);
-  SegmentationReader reader;
+  gdcm::Reader reader;
   reader.SetStream(in);
   try {
     if (!reader.Read()) throw InputError(kUndecoded);
@@ -60,7 +65,7 @@ SegmentFrames::SegmentFrames(const DicomFile& file) : voxels_(size_t(file.column
         (bits_ != 1 && bits_ != 8 && bits_ != 16))
       throw InputError(kUndecoded);
     const double bytes = std::ceil(double(voxels_) * double(file.frames.size()) * double(bits_) / 8);
-    stored_ = packed ? Decoded(reader, bytes) : Stored(reader, bytes);
+    stored_ = packed ? Decoded(reader.GetFile(), file, bits_, bytes) : Stored(reader.GetFile(), bytes);
   } catch (const InputError&) {
     throw;
   } catch (const std::exception&) {  // GDCM's words quote tags

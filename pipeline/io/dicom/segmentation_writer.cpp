@@ -117,6 +117,7 @@ void PutSource(DcmItem& frame, const DicomImages& of, int plane) {
   DcmItem& source = AddItem(derived, DCM_SourceImageSequence);
   Put(source, DCM_ReferencedSOPClassUID, EVR_UI, of.sop_class);
   Put(source, DCM_ReferencedSOPInstanceUID, EVR_UI, of.images[size_t(plane)]);
+  Put(source, DCM_SpatialLocationsPreserved, EVR_CS, "YES");
   PutCode(source, DCM_PurposeOfReferenceCodeSequence, kSource);
 }
 

@@ -85,10 +85,6 @@ TEST(DicomVoxels, WhatTheDecoderDoesNotKnowIsNotCalledDamaged) {
     ElementsOf({.slice = slice, .sop_class = "1.3.12.2.1107.5.9.1"})
         .WriteTo(folder.path() / (std::to_string(slice) + ".dcm"), "1.3.12.2.1107.5.9.1");
   EXPECT_THAT(Complaint(folder.path()), HasSubstr("of a kind (SOP class) that is not read here"));
-  const auto labels = folder.path() / "labels.dcm";
-  WriteFrames(labels, DicomBytes::kLabelMapSegmentation);
-  EXPECT_THAT(RefusalOf<InputError>([&] { ReadLabels(labels); }, "none"),
-              HasSubstr("save a segmentation as .nii.gz or .nrrd"));
 }
 
 // How an image is shown does not change what was measured.

@@ -13,6 +13,7 @@
 #include "pipeline/io/volume_file.h"
 #include "tests/support/dicom_element.h"
 #include "tests/support/fixtures.h"
+#include "tests/support/unzipped.h"
 
 namespace kvx {
 namespace {
@@ -28,14 +29,6 @@ Volume Counted(const Grid& grid, float low, float step) {
   Volume out(grid);
   for (size_t v = 0; v < out.values.size(); ++v) out.values[v] = low + step * float(v % 997);
   return out;
-}
-
-// The images of the zip, in a folder of their own. Paths of ours without blanks: a shell is safe.
-std::filesystem::path Unzipped(const std::filesystem::path& zip) {
-  const auto folder = std::filesystem::path(zip).replace_extension();
-  const std::string command = "/usr/bin/python3 -m zipfile -e " + zip.string() + " " + folder.string();
-  EXPECT_EQ(std::system(command.c_str()), 0);
-  return folder;
 }
 
 // With the greys of the volume itself.

@@ -83,6 +83,7 @@ void SendJobEvents(const httplib::Request& request, httplib::Response& response,
 
 // Requests.
 Query QueryOf(const httplib::Request& request);
+std::string KeyIn(const httplib::Request& request);  // Idempotency-Key, or empty
 // Throws InputError for any parameter below /v1/ where the API's document has none. Where it has some,
 // handlers know them.
 void RequireKnownParameters(const httplib::Request& request);

@@ -112,6 +112,8 @@ Query QueryOf(const httplib::Request& request) {
   return Query(request.params.begin(), request.params.end());
 }
 
+std::string KeyIn(const httplib::Request& request) { return request.get_header_value("Idempotency-Key"); }
+
 void RequireKnownParameters(const httplib::Request& request) {
   const Query query = QueryOf(request);
   const bool of_api = request.path.starts_with("/v1/");  // probes of the others may carry any

@@ -27,7 +27,6 @@ constexpr size_t kJsonBodyBytes = 8 << 20;     // initial poses of many bones an
 constexpr size_t kPoseBodyBytes = kLargeBody;  // of hundreds of bones; none holds a turn while it is posed
 constexpr size_t kPointsBodyBytes = 64 << 20;
 
-std::string Key(const Request& request) { return request.get_header_value("Idempotency-Key"); }
 std::string Id(const Request& request) { return request.path_params.at("id"); }
 std::string PartId(const Request& request) { return request.path_params.at("part"); }
 
@@ -43,7 +42,7 @@ void AddStored(httplib::Server& http, const std::string& path, Stored stored) {
 
 void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/subjects", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateSubject(ServicesOf(r), ReadWhole(c, r, body, kJsonBodyBytes).text, Key(q)));
+    SendAnswer(r, CreateSubject(ServicesOf(r), ReadWhole(c, r, body, kJsonBodyBytes).text, KeyIn(q)));
   });
   http.Get("/v1/subjects",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListSubjects(ServicesOf(r), QueryOf(q))); });
@@ -72,7 +71,7 @@ void AddSubjectRoutes(httplib::Server& http, HttpContext& c) {
 
 void AddModelRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/models", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateModel(ServicesOf(r), ReadWhole(c, r, body, kJsonBodyBytes).text, Key(q)));
+    SendAnswer(r, CreateModel(ServicesOf(r), ReadWhole(c, r, body, kJsonBodyBytes).text, KeyIn(q)));
   });
   http.Get("/v1/models",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListModels(ServicesOf(r), QueryOf(q))); });
@@ -80,7 +79,7 @@ void AddModelRoutes(httplib::Server& http, HttpContext& c) {
            [&](const Request& q, Response& r) { SendJson(r, 200, GetModel(ServicesOf(r), Id(q))); });
   http.Post("/v1/models/:id/animations", [&](const Request& q, Response& r, const ContentReader& body) {
     SendAnswer(r, CreateAnimation(ServicesOf(r), Id(q), QueryOf(q),
-                                  ReadWhole(c, r, body, kJsonBodyBytes).text, Key(q)));
+                                  ReadWhole(c, r, body, kJsonBodyBytes).text, KeyIn(q)));
   });
   http.Get("/v1/models/:id/animations/:part", [&](const Request& q, Response& r) {
     SendFile(q, r, GetAnimation(ServicesOf(r), Id(q), PartId(q), ConditionsOf(q)));
@@ -124,7 +123,7 @@ void AddJobRoutes(httplib::Server& http, HttpContext& c) {
 
 void AddBatchRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/batches", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateBatch(ServicesOf(r), ReadWhole(c, r, body, 4 * kJsonBodyBytes).text, Key(q)));
+    SendAnswer(r, CreateBatch(ServicesOf(r), ReadWhole(c, r, body, 4 * kJsonBodyBytes).text, KeyIn(q)));
   });
   http.Get("/v1/batches",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListBatches(ServicesOf(r), QueryOf(q))); });
@@ -133,7 +132,7 @@ void AddBatchRoutes(httplib::Server& http, HttpContext& c) {
   http.Delete("/v1/batches/:id",
               [&](const Request& q, Response& r) { SendJson(r, 202, CancelBatch(ServicesOf(r), Id(q))); });
   http.Post("/v1/webhooks", [&](const Request& q, Response& r, const ContentReader& body) {
-    SendAnswer(r, CreateWebhook(ServicesOf(r), ReadWhole(c, r, body, kJsonBodyBytes).text, Key(q)));
+    SendAnswer(r, CreateWebhook(ServicesOf(r), ReadWhole(c, r, body, kJsonBodyBytes).text, KeyIn(q)));
   });
   http.Get("/v1/webhooks",
            [&](const Request& q, Response& r) { SendJson(r, 200, ListWebhooks(ServicesOf(r), QueryOf(q))); });

@@ -12,8 +12,6 @@ using httplib::ContentReader;
 using httplib::Request;
 using httplib::Response;
 
-std::string Key(const Request& request) { return request.get_header_value("Idempotency-Key"); }
-
 // Feeds `write` from the wire; false when the client broke off, or is too slow to be waited for. What `write`
 // throws ends the reading. Throws Unauthorised where the key was revoked meanwhile.
 template <class Write>
@@ -49,8 +47,8 @@ Upload PutUpload(Services& services, const Request& request, const char* what) {
   Query query = QueryOf(request);
   query.emplace(what, request.path_params.at("part"));
   const std::string& subject = request.path_params.at("id");
-  Upload upload = std::string(what) == "name" ? Upload::OfScan(services, subject, query, Key(request))
-                                              : Upload::OfBones(services, subject, query, Key(request));
+  Upload upload = std::string(what) == "name" ? Upload::OfScan(services, subject, query, KeyIn(request))
+                                              : Upload::OfBones(services, subject, query, KeyIn(request));
   upload.SameAgainIsFine();
   return upload;
 }
@@ -115,7 +113,7 @@ void Create(Services& s, HttpContext& c, const Request& q, Response& r, const Co
                     metadata = q.get_header_value("Upload-Metadata");
   bool made = false;
   const Answer answer =
-      s.idempotency.Once(KeyOf("POST /v1/uploads", Key(q), {length + "\n" + metadata}), [&] {
+      s.idempotency.Once(KeyOf("POST /v1/uploads", KeyIn(q), {length + "\n" + metadata}), [&] {
         made = true;
         return Answer{201, "/v1/uploads/" + CreateResumableUpload(s, length, metadata).id, ""};
       });
@@ -175,7 +173,7 @@ void AddResumableRoutes(httplib::Server& http, HttpContext& c) {
 
 void AddUploadRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/subjects/:id/scans", [&](const Request& q, Response& r, const ContentReader& body) {
-    ReceiveUpload(Upload::OfScan(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)), q, body, c, r);
+    ReceiveUpload(Upload::OfScan(ServicesOf(r), q.path_params.at("id"), QueryOf(q), KeyIn(q)), q, body, c, r);
   });
   http.Put("/v1/subjects/:id/scans/:part", [&](const Request& q, Response& r, const ContentReader& body) {
     ReceiveUpload(PutUpload(ServicesOf(r), q, "name"), q, body, c, r);
@@ -183,9 +181,10 @@ void AddUploadRoutes(httplib::Server& http, HttpContext& c) {
   http.Post("/v1/subjects/:id/bones", [&](const Request& q, Response& r, const ContentReader& body) {
     if (BonesKindOf(QueryOf(q)) == BonesKind::kThreshold) {
       ReadBody(body, 0);
-      return SendAnswer(r, CreateThresholdBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)));
+      return SendAnswer(r, CreateThresholdBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), KeyIn(q)));
     }
-    ReceiveUpload(Upload::OfBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), Key(q)), q, body, c, r);
+    ReceiveUpload(Upload::OfBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), KeyIn(q)), q, body, c,
+                  r);
   });
   http.Put("/v1/subjects/:id/bones/:part", [&](const Request& q, Response& r, const ContentReader& body) {
     ReceiveUpload(PutUpload(ServicesOf(r), q, "template"), q, body, c, r);

@@ -115,7 +115,7 @@ void RequireOneFrame(const itk::ImageIOBase& io) {
   }
 }
 
-// ITK gives files without directions or spacings unit ones, which is what we mean too.
+// ITK gives files without directions unit ones, which is what we mean too.
 ItkHeader HeaderOf(const itk::ImageIOBase& io) {
   RequireOneFrame(io);
   ItkHeader header;

@@ -1,4 +1,4 @@
-// A header that says nothing of a thing has ITK's usual: 1 mm, the world's axes, an origin of 0.
+// A header that says nothing of axes or an origin has ITK's usual: the world's axes, an origin of 0.
 #include "pipeline/io/text_geometry.h"
 
 #include <algorithm>
@@ -19,6 +19,9 @@ const char kBadSpacing[] =
 const char kBadAxes[] =
     "the volume's header gives axes or an origin that are not finite numbers; correct the header, or convert "
     "the original images again";
+const char kUnspaced[] =
+    "the volume's header does not say how large its voxels are; add a voxel spacing in mm (NRRD: space "
+    "directions or spacings, MetaImage: ElementSpacing), or convert the original images again";
 const char kUncounted[] =
     "the volume's header does not give one voxel spacing (in mm) for each axis; correct the header";
 
@@ -92,12 +95,7 @@ void RequireKnownSpace(const TextHeader& nrrd, size_t dimension) {
 void RequireSpacings(const TextHeader& nrrd, size_t dimension) {
   const Words spacings = Split(nrrd.Value("spacings"));
   if (spacings.empty()) {
-    const bool by_ends = !nrrd.FirstOf({"axis maxs", "axismaxs"}).empty();
-    if (by_ends && nrrd.FirstOf({"space directions", "spacedirections"}).empty()) {
-      throw InputError(
-          "the volume's header gives the ends of its axes (axis mins, axis maxs) but no voxel spacing; save "
-          "it with spacings or space directions");
-    }
+    if (nrrd.FirstOf({"space directions", "spacedirections"}).empty()) throw InputError(kUnspaced);
     return;
   }
   if (spacings.size() != dimension) throw InputError(kUncounted);
@@ -131,6 +129,7 @@ void RequireNrrdGeometry(const TextHeader& nrrd) {
 
 void RequireMetaGeometry(const TextHeader& meta) {
   const size_t dimension = Split(meta.Value("dimsize")).size();
+  if (meta.FirstOf({"elementspacing", "elementsize"}).empty()) throw InputError(kUnspaced);
   for (const char* key : {"elementspacing", "elementsize"}) {
     const Words spacings = Split(meta.Value(key));
     if (spacings.empty()) continue;

@@ -226,7 +226,7 @@ TEST_F(BadNifti, SlopeAndInterceptAreApplied) {
 TEST(BadTextHeaders, AreRefusedWithoutBelievingThem) {
   const ScratchFolder folder;
   const std::string nrrd =
-      "NRRD0004\ntype: short\ndimension: 3\nsizes: 4 4 4\nencoding: raw\nendian: little\n";
+      "NRRD0004\ntype: short\ndimension: 3\nsizes: 4 4 4\nspacings: 1 1 1\nencoding: raw\nendian: little\n";
   const std::string meta =
       "ObjectType = Image\nNDims = 3\nBinaryData = True\nElementSpacing = 1 1 1\nElementType = MET_SHORT\n";
   const std::string data(128, '\1');
@@ -239,7 +239,7 @@ TEST(BadTextHeaders, AreRefusedWithoutBelievingThem) {
       {"good.nrrd", nrrd + "\n" + data, "none"},
       {"cut.nrrd", nrrd + "\n" + data.substr(0, 20), "too short"},
       {"huge.nrrd",
-       "NRRD0004\ntype: short\ndimension: 3\nsizes: 900 900 900\nencoding: raw\nendian: little\n\n" + data,
+       std::string(nrrd).replace(nrrd.find("sizes: 4 4 4"), 12, "sizes: 900 900 900") + "\n" + data,
        "too short"},
       {"bzip2.nrrd",
        std::string(nrrd).replace(nrrd.find("encoding: raw"), 13, "encoding: bzip2") + "\n" + data, "bzip2"},

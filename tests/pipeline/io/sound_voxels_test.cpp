@@ -20,7 +20,7 @@ using testing_support::kGzip;
 using testing_support::kZlib;
 using testing_support::ScratchFolder;
 
-const std::string kNrrd = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 5 4 3\n";
+const std::string kNrrd = "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 5 4 3\nspacings: 1 2 3\n";
 const std::string kMeta =
     "ObjectType = Image\nNDims = 3\nElementSpacing = 1 2 3\nDimSize = 5 4 3\nElementType = MET_UCHAR\n";
 const std::string kHere = "ElementDataFile = LOCAL\n";

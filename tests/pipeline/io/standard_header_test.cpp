@@ -38,7 +38,8 @@ std::vector<float> Expected() {
   return values;
 }
 
-const std::string kNrrd = "NRRD0004\n# made by hand\ntype: unsigned char\ndimension: 3\nsizes: 4 3 2\n";
+const std::string kUnplaced = "NRRD0004\n# made by hand\ntype: unsigned char\ndimension: 3\nsizes: 4 3 2\n";
+const std::string kNrrd = kUnplaced + "spacings: 1 2 3\n";
 const std::string kMeta =
     "ObjectType = Image\nNDims = 3\nBinaryData = True\nElementSpacing = 1 2 3\nDimSize = 4 3 2\n"
     "ElementType = MET_UCHAR\n";
@@ -46,7 +47,7 @@ const std::string kMeta =
 TEST(StandardHeader, KeepsWhatMattersInWordsOfItsOwn) {
   const ScratchFolder folder;
   const std::filesystem::path file = folder.path() / "a.nrrd";
-  const std::string header = kNrrd +
+  const std::string header = kUnplaced +
                              "content: a name\nEncoding: raw\nspace: left-posterior-superior\n"
                              "space directions: (1,0,0) (0,2,0) (0,0,3)\nnote:=x: y\n\n";
   Put(file, header + Bytes(1));
@@ -69,7 +70,8 @@ TEST(StandardHeader, EveryPackingIsReadThroughIt) {
   const std::vector<std::pair<std::string, std::string>> files{
       {"raw.nrrd", kNrrd + "encoding: raw\n\n" + Bytes(1)},
       {"crlf.nrrd",
-       "NRRD0004\r\ntype: uchar\r\ndimension: 3\r\nsizes: 4 3 2\r\nencoding: raw\r\n\r\n" + Bytes(1)},
+       "NRRD0004\r\ntype: uchar\r\ndimension: 3\r\nsizes: 4 3 2\r\nspacings: 1 2 3\r\nencoding: raw\r\n\r\n" +
+           Bytes(1)},
       {"gz.nrrd", kNrrd + "encoding: gzip\n\n" + gz},
       {"text.nrrd", kNrrd + "encoding: ascii\n\n" + text},
       {"skip.nrrd", kNrrd + "line skip: 1\nencoding: raw\n\nanother line\n" + Bytes(1)},
@@ -110,7 +112,7 @@ TEST(StandardHeader, LengthsAreInMillimetresWhateverTheFileHasThemIn) {
     return ReadVolumeInfo(folder.path() / name).grid;
   };
   const auto nrrd = [&](const std::string& units) {
-    return grid_of("a.nrrd", kNrrd + "encoding: raw\n" + lps + units + "\n" + Bytes(1));
+    return grid_of("a.nrrd", kUnplaced + "encoding: raw\n" + lps + units + "\n" + Bytes(1));
   };
   for (const auto& [units, mm] : {std::pair("", 1.0), std::pair("space units: \"mm\" \"mm\" \"mm\"\n", 1.0),
                                   std::pair("space units: \"um\" \"um\" \"um\"\n", 0.001),

@@ -57,7 +57,9 @@ TEST_F(TextGeometry, ASpacingOfANrrdIsAPositiveNumber) {
       {"spacings: 1 2 inf", "not a positive number"},
       {"spacings: 1 2 0,7", "not a positive number"},
       {"spacings: 1 2", "for each axis"},
-      {"axis mins: 0 0 0\naxis maxs: 3 4 3", "no voxel spacing"},
+      {"axis mins: 0 0 0\naxis maxs: 3 4 3", "how large its voxels are"},
+      {"", "how large its voxels are"},
+      {"space: left-posterior-superior\nspace origin: (1,2,3)", "how large its voxels are"},
   };
   for (const Case& c : cases) EXPECT_THAT(Nrrd(c.fields), testing::HasSubstr(c.expected)) << c.fields;
 }
@@ -104,6 +106,7 @@ TEST_F(TextGeometry, OfAMetaImageToo) {
   const Case cases[] = {
       {"ElementSpacing = 1 2 3", "1 2 3"},
       {"ElementSize = 1 2 3", "1 2 3"},
+      {"Offset = 1 2 3", "how large its voxels are"},
       {"ElementSpacing = 1 2 nan", "not a positive number"},
       {"ElementSpacing = 1 2 0", "not a positive number"},
       {"ElementSpacing = 1 2 -3", "not a positive number"},

@@ -145,7 +145,7 @@ TEST(VolumeFile, SegmentsInLayersAreNumberedInTheirOrder) {
 TEST(VolumeFile, SegmentsWithoutLabelValuesHaveALayerEach) {
   const ScratchFolder folder;
   std::ofstream(folder.path() / "bones.seg.nrrd", std::ios::binary)
-      << "NRRD0004\ntype: unsigned char\ndimension: 4\nsizes: 2 2 2 2\nencoding: raw\n"
+      << "NRRD0004\ntype: unsigned char\ndimension: 4\nsizes: 2 2 2 2\nspacings: nan 1 1 1\nencoding: raw\n"
       << "kinds: list domain domain domain\nSegment0_ID:=Segment_1\nSegment0_Name:=femur\n"
       << "Segment1_ID:=Segment_2\nSegment1_Extent:=0 1 0 1 0 1\n\n"
       << std::string("\0\0\1\0\0\1\1\1\0\0\1\0\0\1\0\1", 16);
@@ -157,7 +157,7 @@ TEST(VolumeFile, SegmentsWithoutLabelValuesHaveALayerEach) {
 TEST(VolumeFile, ASegmentationInOneLayerIsAnOrdinaryLabelMap) {
   const ScratchFolder folder;
   std::ofstream(folder.path() / "bones.seg.nrrd", std::ios::binary)
-      << "NRRD0004\ntype: unsigned char\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n"
+      << "NRRD0004\ntype: unsigned char\ndimension: 3\nsizes: 2 2 2\nspacings: 1 1 1\nencoding: raw\n"
       << "Segment0_LabelValue:=7\n\n"
       << std::string("\0\7\0\0\7\3\0\0", 8);
   EXPECT_THAT(ReadLabels(folder.path() / "bones.seg.nrrd").values,

@@ -134,13 +134,13 @@ void RequireNumbers(const TextHeader& header, uint64_t values) {
   if (numbers < values) throw InputError(kCutOff);
 }
 
-// A file that holds a header may end in something else, but not in as much again. Files of voxels alone may
-// be shared by several headers.
+// A file may end in something else, but not in as much again. A header that skips a part of a file of voxels
+// alone knows that there is more in it.
 void RequireNotTwice(const TextHeader& header, size_t bytes) {
   const auto [lines, start] = VoxelStartOf(header);
-  const bool exact = start >= 0 && (header.format == FileFormat::kMeta || lines == header.lines);
-  if (header.attached && exact && MostVoxelBytes(header) >= 2.0 * double(bytes))
-    throw InputError(kHoldsTwice);
+  const bool from_begin = header.attached ? start >= 0 : start == 0;
+  const bool of_lines = header.format == FileFormat::kNrrd && lines != (header.attached ? header.lines : 0);
+  if (from_begin && !of_lines && MostVoxelBytes(header) >= 2.0 * double(bytes)) throw InputError(kHoldsTwice);
 }
 
 }  // namespace

@@ -94,6 +94,22 @@ TEST_F(SoundVoxels, RawOnesThatAreTwiceAsManyAreOfAnotherType) {
       << "the last ones are meant";
 }
 
+TEST_F(SoundVoxels, SoAreThoseOfAFileBesideTheHeader) {
+  const std::string meta = kMeta + "BinaryData = True\n", nrrd = kNrrd + "encoding: raw\ndata file: v.raw\n";
+  const auto with = [&](const std::string& raw) { std::ofstream(folder_.path() / "v.raw") << raw; };
+  with(Voxels() + "an end");
+  EXPECT_EQ(ComplaintOf(meta + "ElementDataFile = v.raw\n", ".mhd"), "none");
+  EXPECT_EQ(ComplaintOf(nrrd, ".nhdr"), "none");
+  with(Voxels() + Voxels());
+  EXPECT_THAT(ComplaintOf(meta + "ElementDataFile = v.raw\n", ".mhd"), HasSubstr("twice as many"));
+  EXPECT_THAT(ComplaintOf(nrrd, ".nhdr"), HasSubstr("twice as many"));
+  with(Voxels(20) + Voxels() + Voxels());
+  EXPECT_EQ(ComplaintOf(meta + "HeaderSize = 20\nElementDataFile = v.raw\n", ".mhd"), "none")
+      << "one of several that share the file";
+  EXPECT_EQ(ComplaintOf(nrrd + "byte skip: 20\n", ".nhdr"), "none");
+  EXPECT_EQ(ComplaintOf(nrrd + "byte skip: -1\n", ".nhdr"), "none") << "the last ones are meant";
+}
+
 TEST_F(SoundVoxels, NothingMayBeMissingAtTheEnd) {
   const std::string gzip = Deflated(Voxels(), kGzip), zlib = Deflated(Voxels(), kZlib);
   const auto check = [&](const std::string& bytes, const std::string& voxels, const char* extension) {

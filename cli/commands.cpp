@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/text/parse_number.h"
+
 namespace kvx {
 namespace {
 
@@ -86,6 +88,16 @@ CLI::Validator ZeroOrAbove() {
 CLI::Validator AtMost(int64_t most) {
   return {[most](std::string& text) {
             return NumberOr(text, 0) <= double(most) ? "" : "must be at most " + std::to_string(most);
+          },
+          "", ""};
+}
+
+CLI::Validator WholeUpTo(uint64_t most) {
+  return {[most](std::string& text) {
+            const auto number = ParseAs<uint64_t>(text);
+            if (!number || *number > most) return "must be a whole number from 0 to " + std::to_string(most);
+            text = std::to_string(*number);
+            return std::string();
           },
           "", ""};
 }

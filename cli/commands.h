@@ -68,6 +68,8 @@ void AddMode(CLI::App& command, std::string& mode);            // --mode
 CLI::Validator AboveZero();
 CLI::Validator ZeroOrAbove();
 CLI::Validator AtMost(int64_t most);
+// To be given to `transform`: a 0 in front does not make a number octal.
+CLI::Validator WholeUpTo(uint64_t most);
 
 // One JSON document and a line feed on stdout; throws Unavailable when it cannot be written.
 void PrintDocument(std::string_view json);

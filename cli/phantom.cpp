@@ -1,6 +1,7 @@
 // kinevox phantom: a synthetic study with known truth.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
@@ -43,7 +44,7 @@ void AddPhantom(CLI::App& program, CommandContext& context) {
       ->check(CLI::IsMember({"hand", "knee"}));
   AddOut(*command, arguments->out, "Folder to write into", "DIR");
   command->add_option("--seed", arguments->options.seed, "Anatomy, poses, texture and noise follow from it")
-      ->check(ZeroOrAbove())
+      ->transform(WholeUpTo(std::numeric_limits<uint64_t>::max()))
       ->capture_default_str();
   command
       ->add_option("--scale", arguments->scale,

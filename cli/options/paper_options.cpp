@@ -6,12 +6,17 @@
 #include "cli/commands.h"
 
 namespace kvx {
+namespace {
+
+constexpr uint64_t kMost = 1'000'000'000;  // as the service takes
+
+}  // namespace
 
 void AddPaperOptions(CLI::App& command, PaperOptions& paper) {
   command
       .add_option("--max-blocks", paper.max_blocks,
                   "Method paper: register at most this many blocks per scan, worst first (0: all)")
-      ->check(ZeroOrAbove())
+      ->transform(WholeUpTo(kMost))
       ->type_name("N");
   command
       .add_option(
@@ -21,7 +26,7 @@ void AddPaperOptions(CLI::App& command, PaperOptions& paper) {
       ->check(ZeroOrAbove())
       ->type_name("S");
   command.add_option("--seed", paper.seed, "Method paper: seed of the random restarts")
-      ->check(ZeroOrAbove())
+      ->transform(WholeUpTo(kMost))
       ->capture_default_str()
       ->type_name("N");
 }

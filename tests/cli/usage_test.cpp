@@ -120,11 +120,25 @@ TEST_F(Usage, WrongCommandLinesAreUsageErrors) {
       {"phantom", "elbow", "--out", "d"},
       {"phantom", "knee"},
       {"phantom", "knee", "--out", "d", "--scale", "double"},
-      {"phantom", "knee", "--out", "d", "--seed", "-1"},
   };
   for (const auto& arguments : wrong) {
     SCOPED_TRACE(testing::PrintToString(arguments));
     ExpectFailure(Run(arguments), kUsage);
+  }
+}
+
+TEST_F(Usage, ASeedIsAWholeNumberThatIsKept) {
+  for (const char* seed : {"-1", "18446744073709551616", "1e3", "1.5", "0x10", "seven", "+1"}) {
+    const Ended ended = Run({"phantom", "knee", "--out", File("d"), "--seed", seed});
+    ExpectFailure(ended, kUsage);
+    EXPECT_THAT(ended.err, HasSubstr("from 0 to 18446744073709551615")) << seed;
+  }
+  for (const char* option : {"--seed", "--max-blocks"}) {
+    for (const char* number : {"9223372036854775808", "1000000001", "-1"}) {
+      const Ended ended = Run({"build", "s.json", "--out", "m", "--method", "paper", option, number});
+      ExpectFailure(ended, kUsage);
+      EXPECT_THAT(ended.err, HasSubstr("from 0 to 1000000000")) << option << " " << number;
+    }
   }
 }
 

@@ -6,6 +6,7 @@
 #include "cli/options/named_files.h"
 #include "cli/options/pose_options.h"
 #include "cli/terminal/kept_memory.h"
+#include "core/text/comma_list.h"
 #include "core/text/extension.h"
 #include "pipeline/io/surface_file.h"
 #include "pipeline/posing/posed_surfaces.h"
@@ -16,6 +17,7 @@ namespace {
 struct SurfaceArguments {
   std::filesystem::path model, out;
   PoseOptions pose;
+  std::vector<std::string> bones;  // as given: names, or lists of them
   SurfaceChoice choice;
   SurfaceOptions options;
 };
@@ -33,8 +35,17 @@ void Print(const std::vector<NamedSurface>& surfaces) {
   PrintDocument(nlohmann::ordered_json{{"surfaces", document}}.dump(1));
 }
 
+SurfaceChoice ChoiceOf(const SurfaceArguments& arguments) {
+  SurfaceChoice choice = arguments.choice;
+  for (const std::string& names : arguments.bones) AddNamesOf(names, choice.bones);
+  if (!arguments.bones.empty() && choice.bones.empty())
+    throw UsageError("--bone holds no name; give names of bones with commas between them, or leave it out");
+  return choice;
+}
+
 void Run(const SurfaceArguments& arguments, const CommandContext& context) {
   KeepFreedMemory(kBlocksOfAProduct);
+  const SurfaceChoice choice = ChoiceOf(arguments);
   if (!HasExtension(arguments.out, ".glb") && !HasExtension(arguments.out, ".stl"))
     throw InputError("--out must end in .glb or .stl: the extension chooses the format");
   RequireMayWrite(arguments.out);
@@ -42,7 +53,7 @@ void Run(const SurfaceArguments& arguments, const CommandContext& context) {
   Backend backend(context.backend);
   const auto engine = model.MakeEngine(backend);
   const TemplateSurfaces surfaces(model.bones(), model.body(), arguments.options);
-  const std::vector<NamedSurface> posed = surfaces.Posed(*engine, pose, arguments.choice);
+  const std::vector<NamedSurface> posed = surfaces.Posed(*engine, pose, choice);
   WriteSurfaces(arguments.out, posed);
   if (context.json) Print(posed);
 }
@@ -54,11 +65,12 @@ void AddSurface(CLI::App& program, CommandContext& context) {
   auto arguments = std::make_shared<SurfaceArguments>();
   AddPosedModel(*command, arguments->model, arguments->pose);
   command
-      ->add_option("--bone", arguments->choice.bones,
-                   "Name of a bone, may be repeated (default: all bones and the skin)")
+      ->add_option("--bone", arguments->bones,
+                   "Names of bones with commas between them, may be repeated (default: all bones and the "
+                   "skin)")
       ->take_all()
       ->allow_extra_args(false)
-      ->type_name("NAME");
+      ->type_name("NAME[,NAME]");
   command->add_flag("--skin", arguments->choice.skin, "The skin; with --bone: beside those bones");
   command
       ->add_option("--smoothing", arguments->options.smoothing_vox,

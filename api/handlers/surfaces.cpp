@@ -1,9 +1,8 @@
 // A surface is made while the client waits.
 #include "api/handlers/surfaces.h"
 
-#include <algorithm>
-
 #include "core/errors.h"
+#include "core/text/comma_list.h"
 
 namespace kvx {
 namespace {
@@ -11,12 +10,7 @@ namespace {
 SurfaceParts PartsOf(const Query& query) {
   SurfaceParts parts;
   const std::string names = QueryValue(query, "bone");
-  for (std::string_view rest = names; !rest.empty();) {
-    const size_t end = std::min(rest.find(','), rest.size());
-    const std::string_view name = rest.substr(0, end);
-    if (end > 0 && std::ranges::find(parts.bones, name) == parts.bones.end()) parts.bones.emplace_back(name);
-    rest.remove_prefix(std::min(end + 1, rest.size()));
-  }
+  AddNamesOf(names, parts.bones);
   if (!names.empty() && parts.bones.empty())
     throw InputError("'bone' holds no name; give names of bones with commas between them, or leave it out");
   if (query.contains("skin")) parts.skin = QueryYesOrNo(query, "skin");

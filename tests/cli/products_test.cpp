@@ -178,8 +178,14 @@ TEST_F(Products, SurfacesAreClosed) {
   }
   EXPECT_EQ(Start("all.glb", 4), "glTF");
   ExpectDone({"surface", At("model"), "--scan", "pose02", "--bone", "lower", "--out", At("lower.stl")});
-  const Ended missing =
-      Run({"surface", At("model"), "--scan", "pose02", "--bone", "tail", "--out", At("x.stl")});
+  const auto of = [](const std::string& bones) {
+    return Run({"surface", At("model"), "--scan", "pose02", "--bone", bones, "--out", At("x.stl"), "--json"});
+  };
+  const json both = json::parse(of("lower,upper,lower").out)["surfaces"];
+  ASSERT_EQ(both.size(), 2u) << "as HTTP's bone=lower,upper,lower";
+  EXPECT_EQ(both[0]["name"], "lower");
+  EXPECT_EQ(of(",").code, 2);
+  const Ended missing = of("lower,tail");
   EXPECT_EQ(missing.code, 5);
   EXPECT_THAT(missing.err, HasSubstr("tail"));
 }

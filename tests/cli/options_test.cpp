@@ -164,13 +164,29 @@ TEST_F(ModelOptions, StagesThatHaveNoFolderAreRefusedBeforeTheBuild) {
   }
 }
 
+// A shell command where folders may be mounted, seen by nobody else; its messages go to `said`.
+int InNamespace(const std::string& command, const std::string& said) {
+  return std::system(("unshare -rm sh -c '" + command + "' 2>" + said).c_str());
+}
+
+TEST_F(ModelOptions, AFolderThatMayNotBeWrittenIsRefusedBeforeTheBuild) {
+  std::filesystem::create_directory(At("m"));
+  const std::string mount =
+      "mount --bind " + At("m") + " " + At("m") + " && mount -o remount,bind,ro " + At("m");
+  if (InNamespace(mount, At("said")) != 0)
+    GTEST_SKIP() << "this user may not mount in a namespace of its own";
+  const std::string build =
+      " && " KVX_PROGRAM " build " + Study() + " --artifacts " + At("stages") + " --out ";
+  EXPECT_EQ(WEXITSTATUS(InNamespace(mount + build + At("m"), At("said"))), 6);
+  EXPECT_THAT(Content(At("said")), HasSubstr("nothing may be written into the output folder"));
+  EXPECT_TRUE(std::filesystem::is_empty(At("stages"))) << "no stage was begun";
+}
+
 // PoCL would end the program at the first kernel.
 TEST_F(ModelOptions, ADeviceThatCannotLoadItsKernelsIsRefused) {
   std::filesystem::create_directory(At("cache"));
   const auto in_namespace = [&](const std::string& command) {
-    return std::system(("unshare -rm sh -c 'mount -t tmpfs -o noexec none " + At("cache") + " && " + command +
-                        "' 2>" + At("said"))
-                           .c_str());
+    return InNamespace("mount -t tmpfs -o noexec none " + At("cache") + " && " + command, At("said"));
   };
   if (in_namespace("true") != 0) GTEST_SKIP() << "this user may not mount a tmpfs in a namespace of its own";
   const std::string program = "POCL_CACHE_DIR=" + At("cache/pocl") + " " KVX_PROGRAM " ";

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/errors.h"
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/model/files/manifest.h"
 
 namespace kvx {
@@ -52,6 +53,13 @@ void RequireModelFolder(const std::filesystem::path& model, const std::filesyste
   }
 }
 
+// Its document is written when all is done, which may take hours.
+void RequireMayHold(const std::filesystem::path& model) try {
+  const AtomicFile tried(model / "model.json");
+} catch (const Denied&) {
+  throw Denied("nothing may be written into the output folder; choose a place where you may write");
+}
+
 }  // namespace
 
 void MakeModelFolder(const std::filesystem::path& model, const std::filesystem::path& stages) {
@@ -60,6 +68,7 @@ void MakeModelFolder(const std::filesystem::path& model, const std::filesystem::
   std::filesystem::create_directories(model, error);
   if (IsDenial(error)) throw Denied("the output folder may not be made; choose a place where you may write");
   if (error) throw InputError("the output folder cannot be made; choose a place where you may write");
+  RequireMayHold(model);
 }
 
 }  // namespace kvx

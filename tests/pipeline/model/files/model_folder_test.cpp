@@ -64,6 +64,13 @@ TEST_F(ModelFolder, OfADamagedModelIsTakenWithItsStagesAlone) {
   EXPECT_FALSE(Takes());
 }
 
+// As a mount of a container leaves one: the build would end without its document.
+TEST_F(ModelFolder, WhereItsDocumentCannotBeWrittenIsRefused) {
+  Put("model.json/file", "text");
+  Put("artifacts/ab/cd.kva", "stage");
+  EXPECT_FALSE(Takes());
+}
+
 // A build that was killed goes on, whatever its stages' folder is called.
 TEST_F(ModelFolder, OfAKilledBuildHoldsStagesUnderTheNameThatWasAskedFor) {
   Put("stages/all/ab/cd.kva", "stage");

@@ -59,7 +59,7 @@ Target TargetOf(const std::filesystem::path& out, const SliceRequest& view) {
 }
 
 struct ShownRoom {
-  const Grid& grid;
+  const Grid grid;
   const Window window;
 };
 
@@ -85,16 +85,16 @@ void Run(const AnimateArguments& arguments, const CommandContext& context) {
   const auto engine = model.MakeEngine(backend);
   ProgressBar bar(context.quiet);
   const Progress progress = bar.AsProgress();
-  const Grid grid = AnimationGrid(*engine, motion, frames, progress.Part(0, 0.3));
+  const auto grid = [&] { return AnimationGrid(*engine, motion, frames, progress.Part(0, 0.3)); };
   const ScalarType type = model.template_scan().stored_as;
   if (target.pictures) {
     const auto sink = target.video ? VideoFile(arguments.out, frames.fps) : PictureFolder(arguments.out);
-    WritePictures(*engine, motion, frames, {grid, WindowOf(model.template_scan().volume)}, view.OfVideo(),
+    WritePictures(*engine, motion, frames, {grid(), WindowOf(model.template_scan().volume)}, view.OfVideo(),
                   *sink, progress.Part(0.3, 1));
   } else {
     const auto sink = target.one_file ? NiftiSequence(arguments.out, type, frames.FrameCount(), frames.fps)
                                       : VolumeFolder(arguments.out, ".nii.gz", type);
-    AnimateVolumes(*engine, motion, frames, grid, view.level, *sink, progress.Part(0.3, 1));
+    AnimateVolumes(*engine, motion, frames, grid(), view.level, *sink, progress.Part(0.3, 1));
   }
   bar.Finish();
   if (context.json)

@@ -45,6 +45,7 @@ void Run(const SliceArguments& arguments, const CommandContext& context) {
     throw UsageError("--window is of pictures: an --out that ends in .png");
   const SliceRequest plane = arguments.slice.Request();
   RequireFitting(plane);
+  RequireMayWrite(arguments.out);
   const auto [model, pose] = LoadPosed(arguments.pose, arguments.model);
   Backend backend(context.backend);
   const Volume slice = Posed(*model.MakeEngine(backend), pose, plane);

@@ -22,6 +22,7 @@ struct SlicesArguments {
 void Run(const SlicesArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   if (!HasExtension(arguments.out, ".png")) throw InputError("--out must end in .png");
+  RequireMayWrite(arguments.out);
   std::vector<Volume> volumes;
   for (const auto& path : arguments.volumes) {
     RequireReadableDicom(path, path.string());

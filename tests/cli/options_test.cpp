@@ -182,6 +182,16 @@ TEST_F(ModelOptions, AFolderThatMayNotBeWrittenIsRefusedBeforeTheBuild) {
   EXPECT_TRUE(std::filesystem::is_empty(At("stages"))) << "no stage was begun";
 }
 
+TEST_F(ModelOptions, WhereAnAnimationCannotBeWrittenIsToldBeforeItsFramesArePosed) {
+  std::ofstream(At("k.json")) << R"({"frames": [{"time": 0, "joints": {}}, {"time": 1, "joints": {}}]})";
+  std::ofstream(At("file")) << "text";
+  for (const std::string& out : {At("no/a.nii.gz"), At("file/frames")}) {
+    const Ended ended = Run({"animate", Built(), "--keyframes", At("k.json"), "--out", out});
+    EXPECT_NE(ended.code, 0) << out;
+    EXPECT_THAT(ended.err, testing::Not(HasSubstr("%"))) << "no step of the work";
+  }
+}
+
 // PoCL would end the program at the first kernel.
 TEST_F(ModelOptions, ADeviceThatCannotLoadItsKernelsIsRefused) {
   std::filesystem::create_directory(At("cache"));

@@ -263,6 +263,18 @@ TEST_F(Usage, AnAddressOfAServiceHasNoPath) {
   EXPECT_EQ(Run({"jobs", "--server", "http://127.0.0.1:1/"}).code, 4) << "nobody listens there";
 }
 
+TEST_F(Usage, WhereNothingCanBeWrittenIsToldBeforeAnythingIsRead) {
+  const std::string scan = File("s.nii", "damaged"), out = File("no/o.png");
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"slices", scan}, {"slice", File("no.model"), "--scan", "a"}}) {
+    std::vector<std::string> all = words;
+    all.insert(all.end(), {"--out", out});
+    const Ended ended = Run(all);
+    ExpectFailure(ended, kInput);
+    EXPECT_THAT(ended.err, HasSubstr("lie in does not exist")) << words[0];
+  }
+}
+
 TEST_F(Usage, AnInterruptedPhantomDoesNotSayThatItGoesOn) {
   testing_support::Program phantom(scratch_.path(), {"phantom", "knee", "--out", File("phantom")});
   while (phantom.Running() && !std::filesystem::exists(File(".phantom.partial"))) usleep(5000);

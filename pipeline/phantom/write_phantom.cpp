@@ -22,17 +22,19 @@ using Eigen::Vector3d;
 
 constexpr double kManyOverlapping = 0.002;  // of soft truth points, above which a user is told
 
-// Where files grow until all is done; removed when it is not.
+// Where files grow until all is done; removed when it is not. A folder that is there is filled and not put in
+// the place of: it may be a mount's, or where a shell stands.
 class PartialFolder {
  public:
   explicit PartialFolder(const fs::path& final_folder)
       : final_(fs::absolute(final_folder).lexically_normal()) {
     if (!final_.has_filename()) final_ = final_.parent_path();
     std::error_code error;
-    if (fs::exists(final_, error) && !(fs::is_directory(final_, error) && fs::is_empty(final_, error))) {
+    inside_ = fs::is_directory(final_, error);
+    if (inside_ ? !HoldsNothing(final_) : fs::exists(final_, error))
       throw InputError("the output folder exists and is not empty; choose another one or remove it");
-    }
-    part_ = final_.parent_path() / ("." + final_.filename().string() + ".partial");
+    part_ =
+        inside_ ? final_ / kPartial : final_.parent_path() / ("." + final_.filename().string() + kPartial);
     fs::remove_all(part_, error);
     if (!fs::create_directories(part_ / "truth", error)) {
       if (IsDenial(error))
@@ -48,16 +50,28 @@ class PartialFolder {
   PartialFolder& operator=(const PartialFolder&) = delete;
 
   const fs::path& path() const { return part_; }
-  void Finish() {
-    std::error_code error;
-    fs::rename(part_, final_, error);
-    if (error)
-      throw Unavailable(
-          "the finished phantom cannot be moved to the output folder; is it still there and empty?");
+  void Finish() try {
+    if (!inside_) return fs::rename(part_, final_);
+    std::vector<fs::path> parts;
+    for (const auto& entry : fs::directory_iterator(part_)) parts.push_back(entry.path());
+    for (const fs::path& part : parts) fs::rename(part, final_ / part.filename());
+  } catch (const fs::filesystem_error&) {
+    throw Unavailable(
+        "the finished phantom cannot be moved to the output folder; is it still there and empty?");
   }
 
  private:
+  static constexpr char kPartial[] = ".partial";
+
+  // But for what a killed program left.
+  static bool HoldsNothing(const fs::path& folder) {
+    std::error_code error;
+    return std::all_of(fs::directory_iterator(folder, error), {},
+                       [](const fs::path& entry) { return entry.filename() == kPartial; });
+  }
+
   fs::path final_, part_;
+  bool inside_ = false;
 };
 
 // One progress of several threads: the mean of their shares, reported one at a time.

@@ -2,6 +2,7 @@
 #include "pipeline/phantom/write_phantom.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <Eigen/QR>
 #include <fstream>
@@ -232,6 +233,22 @@ TEST(WritePhantom, RefusesAFolderWithFilesAndLeavesNothingBehindWhenStopped) {
   const Progress stopped({}, [&] { return ++reports > 3; });
   EXPECT_THROW(WritePhantom(Tiny(4, 1), scratch.path() / "stopped", stopped), Cancelled);
   EXPECT_TRUE(fs::is_empty(scratch.path()));
+}
+
+// As a container's mount, whose parent may not be written and which nothing can be put in the place of.
+TEST(WritePhantom, FillsAFolderThatIsThere) {
+  const testing_support::ScratchFolder scratch;
+  const fs::path folder = scratch.path() / "there";
+  fs::create_directories(folder / ".partial" / "of a killed one");
+  struct stat before {
+  }, after{};
+  ASSERT_EQ(::stat(folder.c_str(), &before), 0);
+  WritePhantom(Tiny(4, 2), folder, {});
+  ASSERT_EQ(::stat(folder.c_str(), &after), 0);
+  EXPECT_EQ(after.st_ino, before.st_ino);
+  EXPECT_FALSE(fs::exists(folder / ".partial"));
+  for (const char* file : {"study.json", "pose01.nii.gz", "truth/pose01_points.npz"})
+    EXPECT_EQ(Bytes(Knee() / file), Bytes(folder / file)) << file;
 }
 
 TEST(SettingsFor, HalvesTheVoxelsAndDoublesTheirSize) {

@@ -104,9 +104,11 @@ std::vector<DicomFile> WithoutCopies(std::vector<DicomFile> series) {
 }
 
 void RequirePlaces(const std::vector<DicomFile>& series) {
-  if (std::ranges::any_of(series, &DicomFile::miscounted)) {
-    throw InputError(
-        "a DICOM image holds another number of frames than it says where they lie; export the images again");
+  for (const DicomFile& file : series) {
+    if (!file.miscounted) continue;
+    throw InputError("a DICOM image says that it holds " + Count(file.miscounted->first, "frames") +
+                     " (Number of Frames), but where " + Count(file.miscounted->second, "of them") +
+                     " lie (Per-frame Functional Groups); export the images again");
   }
   if (std::ranges::none_of(series, [](const DicomFile& file) { return file.frames.empty(); })) return;
   throw InputError(

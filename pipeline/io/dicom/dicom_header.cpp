@@ -24,7 +24,8 @@ using gdcm::Tag;
 
 const Tag kTransferSyntax(0x0002, 0x0010);
 const Tag kImageType(0x0008, 0x0008), kModality(0x0008, 0x0060), kSeriesUid(0x0020, 0x000e),
-    kEcho(0x0018, 0x0086), kRows(0x0028, 0x0010), kColumns(0x0028, 0x0011), kBitsAllocated(0x0028, 0x0100);
+    kEcho(0x0018, 0x0086), kRows(0x0028, 0x0010), kColumns(0x0028, 0x0011), kBitsAllocated(0x0028, 0x0100),
+    kSamples(0x0028, 0x0002);
 const Tag kFrameCount(0x0028, 0x0008), kPixelSpacing(0x0028, 0x0030), kPixelData(0x7fe0, 0x0010);
 const Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kIntercept(0x0028, 0x1052),
     kSlope(0x0028, 0x1053), kShown(0x0028, 0x0004), kBitsStored(0x0028, 0x0101), kSigned(0x0028, 0x0103),
@@ -48,6 +49,9 @@ const char kNoPreamble[] =
     "a file of the DICOM series holds no image, or does not begin as DICOM files do (128 bytes, then DICM); "
     "copy or export it again, or bring one of an old program up to date with dcmconv or gdcmconv";
 const char kDamaged[] = "a DICOM file is damaged or holds no image; export or copy the images again";
+const char kOtherVoxels[] =
+    "a DICOM image is damaged: it does not hold as many voxels as its rows, columns and number of frames "
+    "say; export or copy the images again";
 const char kUnknownPacking[] =
     "the voxels of a DICOM image are packed in a way that is not read here (its transfer syntax); export the "
     "images again, uncompressed (Explicit VR Little Endian)";
@@ -95,9 +99,9 @@ Rescale RescaleOf(FrameTags& tags, size_t frame) {
 // No frames where one or more do not say where they lie.
 void ReadFrames(const DataSet& set, DicomFile& file) {
   FrameTags tags(set);
-  const size_t count = DeclaredFrames(set);
-  file.miscounted = tags.frame_count() > 0 && tags.frame_count() != count;
-  if (count > 1 && tags.frame_count() != count) return;
+  const size_t count = DeclaredFrames(set), placed = tags.frame_count();
+  if (placed > 0 && placed != count) file.miscounted = {count, placed};
+  if (count > 1 && placed != count) return;
   std::vector<DicomFrame> frames;
   std::set<std::pair<double, double>> rescales;
   for (size_t f = 0; f < count; ++f) {
@@ -205,15 +209,19 @@ double HeldBytes(std::istream& in, bool swapped) {
   return std::min(declared, double(std::streamoff(in.tellg()) - begin));
 }
 
-// GDCM fills plain voxels that are not there with zeros; packed ones fail in their decoder.
+// GDCM fills plain voxels that are not there with zeros, and takes the first of too many; packed ones fail in
+// their decoder.
 void RequireAllVoxels(const gdcm::File& file, std::istream& at_voxels, size_t frames) {
   const gdcm::TransferSyntax& syntax = file.GetHeader().GetDataSetTransferSyntax();
   if (syntax.IsEncapsulated() || syntax == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian) return;
   const DataSet& set = file.GetDataSet();
   const double voxels = double(NumberAt(set, kRows)) * double(NumberAt(set, kColumns)) * double(frames);
   const double needed = std::floor(voxels * double(NumberAt(set, kBitsAllocated)) / 8);
-  const bool swapped = syntax.GetSwapCode() == gdcm::SwapCode::BigEndian;
-  if (needed > 0 && needed > HeldBytes(at_voxels, swapped)) throw InputError(kDamaged);
+  if (!(needed > 0)) return;
+  const double held = HeldBytes(at_voxels, syntax.GetSwapCode() == gdcm::SwapCode::BigEndian);
+  const double beyond = held - needed * double(std::max<size_t>(1, NumberAt(set, kSamples)));
+  const bool one_more = beyond >= std::max(2.0, needed / double(frames));  // one byte fills up
+  if (needed > held || one_more) throw InputError(kOtherVoxels);
 }
 
 DicomContent ContentOf(const DataSet& set) {

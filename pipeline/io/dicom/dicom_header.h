@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/frames.h"
@@ -31,7 +32,8 @@ struct DicomFile {
   size_t certain = 0;              // of a segmentation of probabilities: the value of what is sure
   double between_mm = 0;           // from plane to plane, where it says so
   std::vector<DicomFrame> frames;  // in the file's order; none where it does not say where they lie
-  bool miscounted = false;         // says where another number of frames lie than it has
+  // The number of frames by the file's word, and of those whose places it tells, where they differ.
+  std::optional<std::pair<size_t, size_t>> miscounted;
   Rescale rescale;                 // of all frames, by the file's word
   bool coloured = false;           // by a palette or by three values a voxel
   bool of_known_kind = true;       // the decoder reads images of its SOP class

@@ -30,7 +30,7 @@ TEST(DicomVoxels, ALongHeaderDoesNotCountAsVoxels) {
   const auto size = std::filesystem::file_size(second);
   for (const int cut : {2, 4, 6, 8}) {  // of the eight bytes of voxels
     std::filesystem::resize_file(second, size - uintmax_t(cut));
-    EXPECT_THAT(Complaint(folder.path()), HasSubstr("damaged")) << cut;
+    EXPECT_THAT(Complaint(folder.path()), HasSubstr("as many voxels")) << cut;
   }
 }
 
@@ -40,20 +40,21 @@ TEST(DicomVoxels, AnElementTooShortForItsImageIsNoticed) {
     DicomBytes image = ElementsOf({.slice = slice, .voxels = std::string("\3\0\3\0", 4)});
     image.Words(0xfffcfffc, std::string(100, '\0')).WriteTo(folder.path() / (std::to_string(slice) + ".dcm"));
   }
-  EXPECT_THAT(Complaint(folder.path()), HasSubstr("damaged"));
+  EXPECT_THAT(Complaint(folder.path()), HasSubstr("as many voxels"));
 }
 
 // Three frames of two by two voxels, all 3, which the functional groups that all frames share rescale.
-void WriteFrames(const std::filesystem::path& path, const char* sop_class) {
+void WriteFrames(const std::filesystem::path& path, const char* sop_class, const char* count = "3",
+                 int planes = 3) {
   DicomBytes image;
   std::vector<DicomBytes> frames;
   for (const char* place : {"0\\0\\0", "0\\0\\1", "0\\0\\2"})
     frames.push_back(DicomBytes().Sequence(0x00209113, {DicomBytes().Text(0x00200032, "DS", place)}));
   std::string voxels;
-  for (int v = 0; v < 3 * 2 * 2; ++v) voxels += std::string("\3\0", 2);
+  for (int v = 0; v < planes * 2 * 2; ++v) voxels += std::string("\3\0", 2);
   image.Text(0x00080016, "UI", sop_class).Text(0x00080018, "UI", "2.25.8").Text(0x00080060, "CS", "MR");
   image.Text(0x0020000d, "UI", "2.25.3").Text(0x0020000e, "UI", "2.25.5").Short(0x00280002, 1);
-  image.Text(0x00280004, "CS", "MONOCHROME2").Text(0x00280008, "IS", "3").Short(0x00280010, 2);
+  image.Text(0x00280004, "CS", "MONOCHROME2").Text(0x00280008, "IS", count).Short(0x00280010, 2);
   image.Short(0x00280011, 2).Short(0x00280100, 16).Short(0x00280101, 16).Short(0x00280102, 15);
   image.Short(0x00280103, 0);
   image.Sequence(0x52009229,
@@ -63,6 +64,22 @@ void WriteFrames(const std::filesystem::path& path, const char* sop_class) {
                       .Sequence(0x00289145,
                                 {DicomBytes().Text(0x00281052, "DS", "-1024").Text(0x00281053, "DS", "2")})});
   image.Sequence(0x52009230, frames).Words(0x7fe00010, voxels).WriteTo(path, sop_class);
+}
+
+TEST(DicomVoxels, FramesAreAsManyAsTheImageSays) {
+  const ScratchFolder folder;
+  const auto complaint = [&](const char* count, int planes) {
+    WriteFrames(folder.path() / "frames.dcm", DicomBytes::kEnhancedCt, count, planes);
+    return Complaint(folder.path() / "frames.dcm");
+  };
+  EXPECT_EQ(complaint("3", 3), "none");
+  for (const char* count : {"2", "4", "1"}) {
+    EXPECT_THAT(complaint(count, 3),
+                HasSubstr(std::string("holds ") + count + " frames (Number of Frames), but"));
+    EXPECT_THAT(complaint(count, 3), HasSubstr("where 3 of them lie"));
+  }
+  for (const int planes : {2, 4, 6})
+    EXPECT_THAT(complaint("3", planes), HasSubstr("not hold as many voxels as its rows, columns and number"));
 }
 
 // Three slices whose voxels are packed, in two fragments each.

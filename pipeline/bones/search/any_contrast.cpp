@@ -89,6 +89,7 @@ class ClassScores {
     std::vector<CorrelationRatio> ratios(poses.size());
     double looked_at = 0;
     for (const SampleClass& some : classes_) {
+      search_.ThrowIfCancelled();
       const auto sums = search_.scores()(scan, some.points, places, step);
       const auto in_air = search_.scores()(air_of_scan_, some.points, places_in_air, step);
       for (size_t c = 0; c < poses.size(); ++c) ratios[c].Add(sums[c], in_air[c], some.air);

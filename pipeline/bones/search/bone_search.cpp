@@ -58,8 +58,11 @@ double FinestMm(const Grid& template_grid, const Grid& scan_grid) {
 }
 
 BoneSearch::BoneSearch(const SoughtBones& sought, const Volume& scan, Backend& backend,
-                       const std::map<std::string, RigidTransform>& hints)
-    : sought_(sought), scan_levels_(MakeLevels(scan, sought.CoarserLevelsMm())), scores_(backend) {
+                       const std::map<std::string, RigidTransform>& hints, const Progress& progress)
+    : sought_(sought),
+      scan_levels_(MakeLevels(scan, sought.CoarserLevelsMm())),
+      scores_(backend),
+      progress_(progress.Silent()) {
   for (const Volume& level : scan_levels_) device_levels_.emplace_back(backend, level);
   for (const auto& [name, pose] : hints) hints_[bones().IndexOf(name)] = pose;
 }
@@ -121,6 +124,7 @@ std::vector<Candidate> BoneSearch::Measured(int bone, const std::vector<RigidTra
   std::vector<Candidate> out(poses.size());
   std::vector<VoxFromSample> batch;
   for (size_t begin = 0; begin < poses.size(); begin += kBatch) {
+    ThrowIfCancelled();
     batch.resize(std::min(poses.size() - begin, kBatch));
     ParallelEach(batch.size(),
                  [&](size_t c) { batch[c] = ToScanVoxels(scan.grid, poses[begin + c], samples.centre_mm); });

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/bone.h"
+#include "core/host/progress.h"
 #include "pipeline/bones/refine/refine_bone.h"
 #include "pipeline/bones/search/plausibility.h"
 #include "pipeline/bones/template/sought_bones.h"
@@ -39,11 +40,12 @@ std::vector<Candidate> Climb(
 // Finest voxels of a search: those of the coarser image.
 double FinestMm(const Grid& template_grid, const Grid& scan_grid);
 
-// What all bones of one scan share. Keeps a reference to what is sought.
+// What all bones of one scan share. Keeps a reference to what is sought. Of `progress` it asks alone whether
+// to go on: in a wide scan a bone is looked for in millions of poses.
 class BoneSearch {
  public:
   BoneSearch(const SoughtBones& sought, const Volume& scan, Backend& backend,
-             const std::map<std::string, RigidTransform>& hints);
+             const std::map<std::string, RigidTransform>& hints, const Progress& progress = {});
 
   // The same search, which tries these places of bones (by index), too; nothing else speaks for them.
   BoneSearch TryingAlso(std::map<int, RigidTransform> places) const;
@@ -68,6 +70,7 @@ class BoneSearch {
   // At the level at which a bone is looked for first.
   const DeviceScan& DeviceLevelOf(int bone) const { return device_levels_[sought_.FirstLevelOf(bone)]; }
   const BoneScores& scores() const { return scores_; }
+  void ThrowIfCancelled() const { progress_.Report("", 0); }
   // The best `count` of candidates, best first, none too near a better one.
   std::vector<Candidate> Distinct(int bone, const std::vector<Candidate>& all, size_t count) const;
   double OverlapWith(int bone, const RigidTransform& pose, const PartialPose& placed,
@@ -96,6 +99,7 @@ class BoneSearch {
   std::vector<DeviceScan> device_levels_;
   std::map<int, RigidTransform> hints_, also_tried_;
   BoneScores scores_;
+  Progress progress_;
   bool weak_matches_count_ = false;
 };
 

@@ -19,7 +19,7 @@ constexpr size_t kOtherRoots = 2;         // the largest bones beside the root: 
 constexpr int kMappedLevels = 2;
 
 FoundBones Search(const SearchScene& scene, const SoughtBones& sought, Effort effort) {
-  const BoneSearch search(sought, scene.scan, scene.backend, scene.hints);
+  const BoneSearch search(sought, scene.scan, scene.backend, scene.hints, scene.progress);
   return FindBones(search, effort, scene.progress);
 }
 
@@ -37,7 +37,7 @@ void TakeIfClearlyBetter(FoundBones other, FoundBones& best) {
 FoundBones SearchMapped(const SearchScene& scene, const BoneSet& bones, const ContrastMap& contrast,
                         std::map<int, RigidTransform> places) {
   const SoughtBones sought(bones, Mapped(scene.template_volume, contrast), scene.finest_mm, kMappedLevels);
-  const BoneSearch search(sought, scene.scan, scene.backend, scene.hints);
+  const BoneSearch search(sought, scene.scan, scene.backend, scene.hints, scene.progress);
   return FindBones(search.TryingAlso(std::move(places)), Effort::kWhilePromising, scene.progress);
 }
 
@@ -61,10 +61,10 @@ std::optional<LearntContrast> Learnt(const SearchScene& scene, const BoneSearch&
 std::optional<FoundBones> SearchInOtherContrast(const SearchScene& scene, const SoughtBones& sought) {
   const BoneSet& bones = sought.bones();
   const SoughtBones finely(bones, scene.template_volume, scene.finest_mm, kMappedLevels);
-  const BoneSearch fine(finely, scene.scan, scene.backend, {});
+  const BoneSearch fine(finely, scene.scan, scene.backend, {}, scene.progress);
   std::optional<LearntContrast> learnt = Learnt(scene, fine);
   if (sought.FirstLevelOf(0) != finely.FirstLevelOf(0)) {
-    auto other = Learnt(scene, BoneSearch(sought, scene.scan, scene.backend, {}));
+    auto other = Learnt(scene, BoneSearch(sought, scene.scan, scene.backend, {}, scene.progress));
     if (other && (!learnt || other->nats > learnt->nats)) learnt = std::move(other);
   }
   if (!learnt) return std::nullopt;
@@ -79,7 +79,7 @@ FoundBones SearchTurned(const SearchScene& scene, const SoughtBones& sought, int
   const HalfTurned turned = TurnedByHalf(scene.scan, axis);
   auto hints = scene.hints;
   for (auto& [bone, pose] : hints) pose = turned.turned_from_scan * pose;
-  const BoneSearch search(sought, turned.scan, scene.backend, hints);
+  const BoneSearch search(sought, turned.scan, scene.backend, hints, scene.progress);
   FoundBones found = FindBones(search, Effort::kWhilePromising, scene.progress);
   for (BoneFit& fit : found.fits)
     fit.scan_from_template = turned.turned_from_scan.Inverse() * fit.scan_from_template;

@@ -34,6 +34,17 @@ std::optional<LearntContrast> LearntFrom(const EllipsoidWorld& world, const Volu
   return LearnContrast(search, in_template, scan, air, SharedBackend());
 }
 
+TEST(AnyContrast, StopsBetweenItsPoses) {
+  const Volume& in_template = World().template_scan->volume;
+  const Volume scan = Painted(Box({56, 56, 56}, {1.2, 1.2, 1.2}, kOblique), kOneBone, {kMoved});
+  const SoughtBones sought = World().SoughtIn(scan);
+  int asked = 0;
+  const Progress stopped({}, [&] { return ++asked > 2; });
+  const BoneSearch search(sought, scan, SharedBackend(), {}, stopped);
+  const SeenAir air{OuterAir(in_template, "MR", 2), OuterAir(scan, "MR", 2)};
+  EXPECT_THROW(LearnContrast(search, in_template, scan, air, SharedBackend()), Cancelled);
+}
+
 std::optional<ContrastMap> Learnt(double (*curve)(double)) {
   const auto learnt = LearntFrom(World(), ScanBy(curve));
   if (!learnt) return std::nullopt;

@@ -24,5 +24,17 @@ TEST(BoneSearch, AlsoTriesAPlaceBeyondItsOwn) {
   EXPECT_LT(AngleDeg(search.Finest(0, found).pose, truth), 1);
 }
 
+// Where it tries millions of poses, whoever stops it would wait for all of them.
+TEST(BoneSearch, StopsBetweenThePosesOfABone) {
+  const EllipsoidWorld world(kOneBone, Box({60, 52, 46}, {1.0, 1.0, 1.1}, Eigen::Matrix3d::Identity()));
+  const Volume scan = Painted(Box({56, 56, 56}, {4, 4, 4}, Eigen::Matrix3d::Identity()), kOneBone, {{}});
+  const SoughtBones sought = world.SoughtIn(scan);
+  int asked = 0;
+  const Progress stopped({}, [&] { return ++asked > 2; });
+  const BoneSearch search(sought, scan, SharedBackend(), {}, stopped);
+  EXPECT_THROW(search.Find(0, PartialPose(1)), Cancelled);
+  EXPECT_EQ(asked, 3) << "at most two batches of poses";
+}
+
 }  // namespace
 }  // namespace kvx

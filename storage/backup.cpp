@@ -230,6 +230,23 @@ void RequireForBackups(const fs::path& folder) {
       "backup");
 }
 
+[[noreturn]] void ThrowNotWritten(const std::string& folder, const std::error_code& error) {
+  if (IsDenial(error)) throw Denied(folder + " may not be written; choose a place where you may write");
+  if (error == std::errc::not_a_directory || error == std::errc::file_exists)
+    throw InputError("a file stands where " + folder + " is to be; choose another place");
+  throw Unavailable(folder + " cannot be written; is the disk full?");
+}
+
+// All of a backup is read before anything of it is written. Leaves nothing.
+void RequireMayFill(const fs::path& folder) {
+  const bool there = fs::exists(folder);
+  MakePrivateFolder(folder);
+  const fs::path tried = folder / kCopying;
+  MakePrivateFile(tried);
+  fs::remove(tried);
+  if (!there) fs::remove(folder);
+}
+
 [[noreturn]] void ThrowFor(const SQLite::Exception& error) {
   if (error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB)
     throw InputError("the database is damaged; restore the data folder from a backup");
@@ -259,8 +276,8 @@ BackupFigures BackUp(const fs::path& data, const fs::path& backup, CopiedBefore 
   fs::rename(newer, records);
   RemoveWhatWent(data, backup);
   return figures;
-} catch (const fs::filesystem_error&) {
-  throw Unavailable("the backup cannot be written; is the disk full?");
+} catch (const fs::filesystem_error& error) {
+  ThrowNotWritten("the backup", error.code());
 } catch (const SQLite::Exception& error) {
   ThrowFor(error);
 }
@@ -271,6 +288,7 @@ BackupFigures Restore(const fs::path& backup, const fs::path& data, const Progre
     throw InputError(
         "the folder to restore into is not empty; give a new one, or remove what a restore that failed left "
         "there");
+  RequireMayFill(data);
   RequireSound(backup, progress.Part(0, 0.5));
   BackupFigures figures;
   MakePrivateFolder(data);
@@ -285,8 +303,8 @@ BackupFigures Restore(const fs::path& backup, const fs::path& data, const Progre
   fs::rename(passing, records);
   MakeLocked(data);
   return figures;
-} catch (const fs::filesystem_error&) {
-  throw Unavailable("the data folder cannot be written; is the disk full?");
+} catch (const fs::filesystem_error& error) {
+  ThrowNotWritten("the data folder", error.code());
 } catch (const SQLite::Exception&) {
   throw InputError("the backup's database is damaged; use another backup");
 }

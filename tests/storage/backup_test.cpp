@@ -167,6 +167,28 @@ TEST_F(Backup, IsNotReadForAFolderThatHoldsOtherThings) {
   EXPECT_EQ(told, 0);
 }
 
+TEST_F(Backup, IsNotReadForAPlaceThatMayNotBeWritten) {
+  BackUp(data(), copy());
+  int told = 0;
+  const Progress counted([&](std::string_view, double) { ++told; }, {});
+  const fs::path locked = scratch.path() / "locked";
+  fs::create_directory(locked);
+  fs::permissions(locked, fs::perms::owner_read | fs::perms::owner_exec);
+  EXPECT_THAT(Denial([&] { Restore(copy(), locked / "new", counted); }),
+              testing::HasSubstr("the data folder may not"));
+  EXPECT_THAT(Denial([&] { Restore(copy(), locked, counted); }),
+              testing::HasSubstr("the data folder may not"));
+  Write(scratch.path() / "file", "text");
+  for (const char* place : {"file", "file/new"}) {
+    EXPECT_THROW(Restore(copy(), scratch.path() / place, counted), InputError) << place;
+    EXPECT_THROW(BackUp(data(), scratch.path() / place), InputError) << place;
+  }
+  EXPECT_EQ(told, 0);
+  fs::remove(copy() / upload);
+  EXPECT_THROW(Restore(copy(), scratch.path() / "new"), InputError);
+  EXPECT_FALSE(fs::exists(scratch.path() / "new")) << "nothing was left";
+}
+
 TEST_F(Backup, IsRestoredOnAFreshDisk) {
   BackUp(data(), copy());
   fs::create_directories(scratch.path() / "new" / "lost+found");

@@ -12,6 +12,10 @@
 namespace kvx {
 namespace {
 
+const char kNoModel[] =
+    "the output folder is no model and holds what no build left there; choose a new folder (nothing was "
+    "changed)";
+
 // A build leaves model.json, its stages, and if it was killed perhaps a temporary model.json.
 bool CouldBeOurs(const std::filesystem::path& entry, const std::filesystem::path& stages) {
   const std::string name = entry.filename().string();
@@ -42,15 +46,12 @@ void RequireModelFolder(const std::filesystem::path& model, const std::filesyste
   if (!std::filesystem::is_directory(model))
     throw InputError("the output path is a file's, not a model's; choose a new folder (nothing was changed)");
   const std::filesystem::path document = model / "model.json";
+  if (std::filesystem::is_directory(document)) throw InputError(kNoModel);
   if (IsWholeModel(document)) return;
   bool ours = !std::filesystem::exists(document) || MayBeDamagedModel(document, stages);
   for (const auto& entry : std::filesystem::directory_iterator(model))
     ours &= CouldBeOurs(entry.path(), stages);
-  if (!ours) {
-    throw InputError(
-        "the output folder is no model and holds what no build left there; choose a new folder (nothing was "
-        "changed)");
-  }
+  if (!ours) throw InputError(kNoModel);
 }
 
 // Its document is written when all is done, which may take hours.

@@ -64,8 +64,8 @@ TEST_F(ModelFolder, OfADamagedModelIsTakenWithItsStagesAlone) {
   EXPECT_FALSE(Takes());
 }
 
-// As a mount of a container leaves one: the build would end without its document.
-TEST_F(ModelFolder, WhereItsDocumentCannotBeWrittenIsRefused) {
+// As a mount of a container leaves one.
+TEST_F(ModelFolder, WhoseDocumentIsAFolderIsRefused) {
   Put("model.json/file", "text");
   Put("artifacts/ab/cd.kva", "stage");
   EXPECT_FALSE(Takes());

@@ -76,13 +76,15 @@ SegmentFrames::SegmentFrames(const DicomFile& file) : voxels_(size_t(file.column
 std::vector<uint16_t> SegmentFrames::Frame(size_t frame) const {
   std::vector<uint16_t> values(voxels_);
   const auto byte = [&](size_t at) { return uint16_t(uint8_t(stored_[at])); };
-  for (size_t v = 0; v < voxels_; ++v) {
-    const size_t at = frame * voxels_ + v;
-    if (bits_ == 1)
-      values[v] = byte(at / 8) >> (at % 8) & 1;
-    else
-      values[v] = bits_ == 8 ? byte(at) : uint16_t(byte(2 * at) | byte(2 * at + 1) << 8);
+  const size_t begin = frame * voxels_;
+  for (size_t v = 0; v < voxels_ && bits_ == 1; ++v) {
+    const uint16_t eight = byte((begin + v) / 8);
+    values[v] = eight >> (begin + v) % 8 & 1;
+    if (eight == 0) v += 7 - (begin + v) % 8;  // on to the next byte: most are empty
   }
+  for (size_t v = 0; v < voxels_ && bits_ == 8; ++v) values[v] = byte(begin + v);
+  for (size_t v = 0; v < voxels_ && bits_ == 16; ++v)
+    values[v] = uint16_t(byte(2 * (begin + v)) | byte(2 * (begin + v) + 1) << 8);
   return values;
 }
 

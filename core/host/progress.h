@@ -19,9 +19,10 @@ class Progress {
   Progress(Sink sink, Cancel cancel) : sink_(std::move(sink)), cancel_(std::move(cancel)) {}
 
   void Report(std::string_view stage, double fraction) const {
-    if (cancel_ && cancel_()) throw Cancelled();
+    if (IsCancelled()) throw Cancelled();
     if (sink_) sink_(stage, begin_ + fraction * (end_ - begin_));
   }
+  bool IsCancelled() const { return cancel_ && cancel_(); }
   // A view whose 0..1 is [begin, end] of this one.
   Progress Part(double begin, double end) const {
     Progress part(sink_, cancel_);

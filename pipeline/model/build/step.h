@@ -30,7 +30,7 @@ inline Progress Named(const Progress& progress, std::string name) {
         const size_t colon = std::min(stage.find(':'), stage.size());
         progress.Report(name + std::string(stage.substr(colon)), fraction);
       },
-      {});
+      [progress] { return progress.IsCancelled(); });  // a silent view of it stops, too
 }
 
 template <class Stage>

@@ -139,5 +139,14 @@ TEST_F(StepTest, ReportsUnderTheNameItIsGiven) {
   for (const std::string& name : names) EXPECT_EQ(name, "double pose01");
 }
 
+TEST(Named, ASilentViewStopsAsTheWholeDoes) {
+  bool stop = false;
+  const Progress named = Named(Progress({}, [&] { return stop; }), "register_bones pose01");
+  EXPECT_NO_THROW(named.Silent().Report("", 0));
+  stop = true;
+  EXPECT_THROW(named.Silent().Report("", 0), Cancelled);
+  EXPECT_THROW(named.Report("", 0), Cancelled);
+}
+
 }  // namespace
 }  // namespace kvx

@@ -46,6 +46,8 @@ void Run(const BuildArguments& arguments, const CommandContext& context) {
   const auto start = std::chrono::steady_clock::now();
   const Study study = FromFile(arguments.study, ReadStudy);
   for (const StudyScan& scan : study.scans) RequireReadableDicom(scan.volume, "scan '" + scan.name + "'");
+  RequireReadableSegments(study.bone_labels, "bones.labels", study.bones);
+  RequireReadableSegments(study.bone_seeds, "bones.seeds");
   if (!arguments.artifacts.empty())
     WithName<InputError, Denied>("--artifacts", [&] { RequireMayFill(arguments.artifacts); });
   BuildOptions options;

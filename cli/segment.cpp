@@ -109,8 +109,13 @@ void Print(const std::vector<ProposedBone>& bones, const std::vector<std::string
   if (json) PrintDocument(nlohmann::ordered_json{{"bones", list}, {"warnings", warnings}}.dump(2));
 }
 
-Scan ReadNamed(const Task& task) {
+void RequireReadable(const Task& task, const std::filesystem::path& previous) {
   RequireReadableDicom(task.scan, task.scan_name);
+  RequireReadableSegments(task.seeds, "the strokes");
+  RequireReadableSegments(previous, "--previous");
+}
+
+Scan ReadNamed(const Task& task) {
   try {
     return ReadScanEvenly(task.scan);
   } catch (const InputError& error) {
@@ -128,6 +133,7 @@ void Run(const SegmentArguments& arguments, const CommandContext& context) {
   if (!arguments.previous.empty() && task.seeds.empty())
     throw UsageError("--previous goes with strokes; a threshold starts from nothing");
   if (!arguments.previous.empty()) RequireThere(arguments.previous);
+  RequireReadable(task, arguments.previous);
   const Artifact<Scan> scan{{}, std::make_shared<Scan>(ReadNamed(task))};
   Backend backend(context.backend);
   ProgressBar bar(context.quiet);

@@ -17,13 +17,15 @@
 #include "cli/terminal/interrupt.h"
 #include "core/text/extension.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/mask_folder.h"
 #include "pipeline/io/volume_file.h"
 
 namespace kvx {
 namespace {
 
 // Leaves without destructors: all but the outcome belongs to the parent.
-[[noreturn]] void TryAndLeave(const std::filesystem::path& scan) {
+template <class Read>
+[[noreturn]] void TryAndLeave(const Read& read) {
   const rlimit none{0, 0};
   ::setrlimit(RLIMIT_CORE, &none);
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -33,7 +35,7 @@ namespace {
   ::dup2(nowhere, STDOUT_FILENO);
   ::dup2(nowhere, STDERR_FILENO);
   try {
-    ReadScan(scan);
+    read();
   } catch (...) {  // the parent comes to the same refusal by itself
   }
   ::_exit(0);
@@ -44,6 +46,18 @@ int WaitFor(pid_t child) {
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   return status;
+}
+
+template <class Read>
+void TryInChild(const std::string& name, const Read& read) {
+  const pid_t child = ::fork();
+  if (child == 0) TryAndLeave(read);
+  if (child < 0) throw Unavailable("no process can be started to read the DICOM images; try again");
+  const int status = WaitFor(child);
+  ThrowIfInterrupted();
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) throw std::bad_alloc();
+  throw InputError(name + ": the DICOM images are so damaged that they cannot be read; export them again");
 }
 
 }  // namespace
@@ -94,15 +108,12 @@ std::string ContentOf(const std::filesystem::path& named) {
 }
 
 void RequireReadableDicom(const std::filesystem::path& scan, const std::string& name) {
-  if (!HoldsDicom(scan)) return;
-  const pid_t child = ::fork();
-  if (child == 0) TryAndLeave(scan);
-  if (child < 0) throw Unavailable("no process can be started to read the DICOM images; try again");
-  const int status = WaitFor(child);
-  ThrowIfInterrupted();
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
-  if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) throw std::bad_alloc();
-  throw InputError(name + ": the DICOM images are so damaged that they cannot be read; export them again");
+  if (HoldsDicom(scan)) TryInChild(name, [&] { ReadScan(scan); });
+}
+
+void RequireReadableSegments(const std::filesystem::path& labels, const std::string& name,
+                             const std::vector<StudyBone>& bones) {
+  if (HoldsDicom(labels)) TryInChild(name, [&] { ReadLabelsOrMasks(labels, bones); });
 }
 
 }  // namespace kvx

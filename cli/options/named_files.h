@@ -3,7 +3,9 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "core/study.h"
 #include "core/text/named_error.h"
 
 namespace kvx {
@@ -28,6 +30,10 @@ std::string ContentOf(const std::filesystem::path& named);
 // formats are left alone. To be called before this process has threads of its own (it forks).
 // Throws InputError that begins with `name`.
 void RequireReadableDicom(const std::filesystem::path& scan, const std::string& name);
+// The same of a label map, of strokes, or of a folder of masks of these bones; nothing where there is no
+// path.
+void RequireReadableSegments(const std::filesystem::path& labels, const std::string& name,
+                             const std::vector<StudyBone>& bones = {});
 
 // What `read` makes of the file; its InputError or Denied gets the file's name. The pipeline names no paths
 // itself: the service must not tell them.

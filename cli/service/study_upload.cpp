@@ -205,6 +205,7 @@ class Sender {
   std::filesystem::path LabelMapFile() {
     const std::filesystem::path& labels = study_.bone_labels;
     if (!HoldsDicom(labels)) return labels;
+    RequireReadableSegments(labels, "DICOM", study_.bones);
     Show("packing the bones");
     LayeredLabels given = ReadLabelsOrMasks(labels, study_.bones);
     const std::filesystem::path file = Scratch("bones.nii.gz");

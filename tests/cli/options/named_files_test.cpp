@@ -5,8 +5,11 @@
 #include <sys/prctl.h>
 
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <thread>
 
+#include "tests/support/dicom_segmentation.h"
+#include "tests/support/hinge_study.h"
 #include "tests/support/program_test.h"
 
 namespace kvx {
@@ -51,6 +54,26 @@ TEST_F(NamedFiles, WhatIsNotThereIsNotFoundWhereverItIsNamed) {
       {"slices", none, "--out", At("o.png")},
       {"serve", "--config", none, "--print-config"}};
   for (const auto& command : commands) ExpectRefused(command, kNotFound, none + " does not exist");
+}
+
+// Where a file ends inside of an element, GDCM ends the process that reads it.
+TEST_F(NamedFiles, ASegmentationThatEndsItsReaderIsRefused) {
+  const fs::path damaged = At("seg.dcm");
+  testing_support::WriteSegmentation(damaged, 2);
+  const size_t rows = testing_support::Content(damaged).find(std::string("\x28\0\x10\0US", 6));
+  ASSERT_NE(rows, std::string::npos);
+  fs::resize_file(damaged, rows + 7);
+  testing_support::WriteHingeStudy(scratch.path());
+  auto study = nlohmann::json::parse(std::ifstream(At("study.json")));
+  const std::string scan = At(study["scans"][0]["volume"]);
+  for (const char* field : {"labels", "seeds"}) {
+    study["bones"].erase("labels");
+    study["bones"][field] = "seg.dcm";
+    std::ofstream(At("damaged.json")) << study;
+    ExpectRefused({"build", At("damaged.json"), "--out", At("m")}, kInput, std::string("bones.") + field);
+    study["bones"].erase(field);
+  }
+  ExpectRefused({"segment", scan, "--seeds", damaged, "--out", At("o.nii.gz")}, kInput, "the strokes");
 }
 
 TEST_F(NamedFiles, AFolderIsNoFile) {

@@ -32,6 +32,14 @@ TEST(Subjects, AreCheckedAndRepeatable) {
   EXPECT_EQ(CreateSubject(w.services, R"({"region":"hand","external_id":"e1"})", "k").body, first.body);
   EXPECT_THROW(CreateSubject(w.services, R"({"region":"knee"})", "k"), Conflict);
   EXPECT_THROW(CreateSubject(w.services, R"({"region":"hand","external_id":"e1"})", ""), Conflict);
+  for (const char* field : {"name", "external_id"}) {
+    const auto body = [&](const std::string& text) {
+      return std::string(R"({"region":"hand",")") + field + "\":\"" + text + "\"}";
+    };
+    for (const char* text : {"a\\nb", "\\u0000", "\x7f"})
+      EXPECT_THROW(CreateSubject(w.services, body(text), ""), InputError) << field << text;
+    EXPECT_EQ(CreateSubject(w.services, body("K\xc3\xb6ln 2"), "").status, 201);
+  }
   EXPECT_THROW(CreateSubject(w.services, R"({"region":"hand","external_id":""})", ""), InputError)
       << "the next one without an id of its own would be in its way";
   EXPECT_THROW(CreateSubject(w.services, R"({"region":"foot"})", ""), InputError);

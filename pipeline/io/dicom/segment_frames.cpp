@@ -15,7 +15,7 @@
 namespace kvx {
 namespace {
 
-constexpr double kMostBytes = 8e9;
+constexpr double kMostBytes = 4e9;  // of packed voxels, which a small file can hold many of
 const gdcm::Tag kBitsAllocated(0x0028, 0x0100), kPixelData(0x7fe0, 0x0010);
 const char kUndecoded[] =
     "the voxels of the DICOM segmentation (SEG) are damaged, or packed in a way that is not read here; save "

@@ -101,7 +101,7 @@ void ReadFrames(const DataSet& set, DicomFile& file) {
   FrameTags tags(set);
   const size_t count = DeclaredFrames(set), placed = tags.frame_count();
   if (placed > 0 && placed != count) file.miscounted = {count, placed};
-  if (count > 1 && placed != count) return;
+  if (file.miscounted || (count > 1 && placed == 0)) return;
   std::vector<DicomFrame> frames;
   std::set<std::pair<double, double>> rescales;
   for (size_t f = 0; f < count; ++f) {

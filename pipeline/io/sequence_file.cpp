@@ -103,7 +103,9 @@ class FrameFolder {
     fs::create_directories(waiting_, error);
     if (IsDenial(error))
       throw Denied("the output folder may not be made; choose a place where you may write");
-    if (error) throw Unavailable("the output folder cannot be made");
+    if (error == std::errc::not_a_directory || error == std::errc::file_exists)
+      throw InputError("the output folder cannot be made where a file is; choose another place");
+    if (error) throw Unavailable("the output folder cannot be made; is the disk full?");
   }
   ~FrameFolder() {
     std::error_code ignored;

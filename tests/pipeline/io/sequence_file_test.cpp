@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+
+#include "core/errors.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/fixtures.h"
 
@@ -47,6 +50,15 @@ TEST(SequenceFile, VolumesAppearWithTheLastOfThem) {
   sink->Finish();
   EXPECT_EQ(ReadVolumeInfo(folder / "frame_0000.nii.gz").grid, volume.grid);
   EXPECT_EQ(Files(folder), 1u);
+}
+
+// A wrong path is the caller's to mend, as no full disk is.
+TEST(SequenceFile, WhereAFileIsNoFolderIsMade) {
+  const testing_support::ScratchFolder scratch;
+  std::ofstream(scratch.path() / "file") << "kept";
+  for (const fs::path& folder : {scratch.path() / "file", scratch.path() / "file" / "frames"})
+    EXPECT_THROW(VolumeFolder(folder, ".nii.gz", ScalarType::kUint8), InputError) << folder;
+  EXPECT_EQ(Content(scratch.path() / "file"), "kept");
 }
 
 TEST(SequenceFile, ANameMayBeAsLongAsTheDiskTakes) {

@@ -37,6 +37,27 @@ std::string Decimals(std::initializer_list<double> values) {
   return text;
 }
 
+void PutOrientation(DcmItem& item, const Grid& grid) {
+  const Eigen::Vector3d right = grid.direction.col(0), down = grid.direction.col(1);
+  Put(item, DCM_ImageOrientationPatient, EVR_DS,
+      Decimals({right.x(), right.y(), right.z(), down.x(), down.y(), down.z()}));
+}
+
+void PutPixelSpacing(DcmItem& item, const Grid& grid) {
+  Put(item, DCM_PixelSpacing, EVR_DS, Decimals({grid.spacing_mm.y(), grid.spacing_mm.x()}));  // rows first
+}
+
+void PutPixels(DcmItem& item, const Grid& grid, int bits, bool with_sign) {
+  Put(item, DCM_SamplesPerPixel, 1);
+  Put(item, DCM_PhotometricInterpretation, EVR_CS, "MONOCHROME2");
+  Put(item, DCM_Rows, grid.size.y());
+  Put(item, DCM_Columns, grid.size.x());
+  Put(item, DCM_BitsAllocated, bits);
+  Put(item, DCM_BitsStored, bits);
+  Put(item, DCM_HighBit, bits - 1);
+  Put(item, DCM_PixelRepresentation, with_sign ? 1 : 0);
+}
+
 std::string UidOf(const Digest& digest, std::string_view what, int number) {
   Digest bits = Hasher().Add(digest).Add(what).Add(int64_t(number)).Finish();
   bits.bytes[6] = (bits.bytes[6] & 0x0f) | 0x80;

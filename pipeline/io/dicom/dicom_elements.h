@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "core/digest.h"
+#include "core/grid.h"
 
 namespace kvx {
 
@@ -27,6 +28,12 @@ void PutCode(DcmItem& item, const DcmTagKey& sequence, const DicomCode& code);
 // At most 16 letters each, as DS asks for.
 std::string Decimal(double value);
 std::string Decimals(std::initializer_list<double> values);
+
+// How the planes k of the grid lie, but for their place.
+void PutOrientation(DcmItem& item, const Grid& grid);
+void PutPixelSpacing(DcmItem& item, const Grid& grid);
+// How the voxels of such a plane are stored: whole numbers of `bits` bits.
+void PutPixels(DcmItem& item, const Grid& grid, int bits, bool with_sign);
 
 // A UUID of version 8 (RFC 9562) out of the digest, as PS3.5 B.2 writes it.
 std::string UidOf(const Digest& digest, std::string_view what, int number = 0);

@@ -34,9 +34,9 @@ struct DicomFile {
   std::vector<DicomFrame> frames;  // in the file's order; none where it does not say where they lie
   // The number of frames by the file's word, and of those whose places it tells, where they differ.
   std::optional<std::pair<size_t, size_t>> miscounted;
-  Rescale rescale;                 // of all frames, by the file's word
-  bool coloured = false;           // by a palette or by three values a voxel
-  bool of_known_kind = true;       // the decoder reads images of its SOP class
+  Rescale rescale;            // of all frames, by the file's word
+  bool coloured = false;      // by a palette or by three values a voxel
+  bool of_known_kind = true;  // the decoder reads images of its SOP class
   // Shown inverted (MONOCHROME1): the decoder gives this less what is stored.
   std::optional<double> inverted_from;
 };

@@ -114,23 +114,14 @@ void PutValues(DcmItem& set, const std::string& modality, const DicomGreys& grey
 }
 
 void PutPlane(DcmItem& set, const Grid& grid, int k) {
-  const Eigen::Vector3d at = grid.ToMm(0, 0, k).lps, right = grid.direction.col(0),
-                        down = grid.direction.col(1);
+  const Eigen::Vector3d at = grid.ToMm(0, 0, k).lps;
   Put(set, DCM_InstanceNumber, EVR_IS, std::to_string(k + 1));
   Put(set, DCM_PatientOrientation, EVR_CS, "");
   Put(set, DCM_ImagePositionPatient, EVR_DS, Decimals({at.x(), at.y(), at.z()}));
-  Put(set, DCM_ImageOrientationPatient, EVR_DS,
-      Decimals({right.x(), right.y(), right.z(), down.x(), down.y(), down.z()}));
-  Put(set, DCM_PixelSpacing, EVR_DS, Decimals({grid.spacing_mm.y(), grid.spacing_mm.x()}));  // rows first
+  PutOrientation(set, grid);
+  PutPixelSpacing(set, grid);
   Put(set, DCM_SliceThickness, EVR_DS, Decimal(grid.spacing_mm.z()));
-  Put(set, DCM_SamplesPerPixel, 1);
-  Put(set, DCM_PhotometricInterpretation, EVR_CS, "MONOCHROME2");
-  Put(set, DCM_Rows, grid.size.y());
-  Put(set, DCM_Columns, grid.size.x());
-  Put(set, DCM_BitsAllocated, 16);
-  Put(set, DCM_BitsStored, 16);
-  Put(set, DCM_HighBit, 15);
-  Put(set, DCM_PixelRepresentation, 1);
+  PutPixels(set, grid, 16, true);
 }
 
 std::string ImageUidOf(const Digest& content, int k) { return UidOf(content, "image", k); }

@@ -100,15 +100,12 @@ void PutDimensions(DcmItem& set, const std::string& uid) {
 }
 
 void PutShared(DcmItem& set, const Grid& grid) {
-  const Eigen::Vector3d right = grid.direction.col(0), down = grid.direction.col(1);
   DcmItem& shared = AddItem(set, DCM_SharedFunctionalGroupsSequence);
-  Put(AddItem(shared, DCM_PlaneOrientationSequence), DCM_ImageOrientationPatient, EVR_DS,
-      Decimals({right.x(), right.y(), right.z(), down.x(), down.y(), down.z()}));
+  PutOrientation(AddItem(shared, DCM_PlaneOrientationSequence), grid);
   DcmItem& measures = AddItem(shared, DCM_PixelMeasuresSequence);
   Put(measures, DCM_SliceThickness, EVR_DS, Decimal(grid.spacing_mm.z()));
   Put(measures, DCM_SpacingBetweenSlices, EVR_DS, Decimal(grid.spacing_mm.z()));
-  Put(measures, DCM_PixelSpacing, EVR_DS,
-      Decimals({grid.spacing_mm.y(), grid.spacing_mm.x()}));  // rows first
+  PutPixelSpacing(measures, grid);
 }
 
 void PutSource(DcmItem& frame, const DicomImages& of, int plane) {
@@ -135,14 +132,7 @@ void PutFrame(DcmItem& set, const Grid& grid, const SegmentPlane& plane, const D
 
 void PutVoxels(DcmItem& set, const Grid& grid, size_t frames, const std::vector<Uint8>& bits) {
   Put(set, DCM_NumberOfFrames, EVR_IS, std::to_string(frames));
-  Put(set, DCM_SamplesPerPixel, 1);
-  Put(set, DCM_PhotometricInterpretation, EVR_CS, "MONOCHROME2");
-  Put(set, DCM_Rows, grid.size.y());
-  Put(set, DCM_Columns, grid.size.x());
-  Put(set, DCM_BitsAllocated, 1);
-  Put(set, DCM_BitsStored, 1);
-  Put(set, DCM_HighBit, 0);
-  Put(set, DCM_PixelRepresentation, 0);
+  PutPixels(set, grid, 1, false);
   Require(set.putAndInsertUint8Array(DcmTag(DCM_PixelData, EVR_OB), bits.data(), bits.size()));
 }
 

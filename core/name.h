@@ -20,4 +20,12 @@ inline bool IsName(std::string_view text) {
          text != "..";
 }
 
+constexpr size_t kLongestTitle = 256;  // bytes
+
+// What people call a study or a subject: one line, without control characters of ASCII.
+inline bool IsTitle(std::string_view text) {
+  return text.size() <= kLongestTitle &&
+         std::ranges::none_of(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+}
+
 }  // namespace kvx

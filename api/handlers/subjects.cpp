@@ -1,27 +1,20 @@
 // POST /v1/subjects {name?, region, external_id?}
 #include "api/handlers/subjects.h"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "api/views.h"
 #include "core/errors.h"
+#include "core/name.h"
 #include "core/region_presets.h"
 
 namespace kvx {
 namespace {
 
-constexpr size_t kLongestText = 256;
-
-bool IsText(const std::string& text) {
-  const auto controls = [](char c) { return (c >= 0 && c < ' ') || c == '\x7f'; };
-  return text.size() <= kLongestText && std::ranges::none_of(text, controls);
-}
-
 std::optional<std::string> OptionalText(const Json& json, const std::string& field) {
   const auto found = json.find(field);
   if (found == json.end() || found->is_null()) return std::nullopt;
-  if (!found->is_string() || !IsText(found->get_ref<const std::string&>()))
+  if (!found->is_string() || !IsTitle(found->get_ref<const std::string&>()))
     throw InputError("'" + field + "' is a text of at most 256 bytes, without line breaks and the like");
   return found->get<std::string>();
 }

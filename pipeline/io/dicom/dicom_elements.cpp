@@ -37,6 +37,11 @@ std::string Decimals(std::initializer_list<double> values) {
   return text;
 }
 
+void PutPosition(DcmItem& item, const Grid& grid, int k) {
+  const Eigen::Vector3d at = grid.ToMm(0, 0, k).lps;
+  Put(item, DCM_ImagePositionPatient, EVR_DS, Decimals({at.x(), at.y(), at.z()}));
+}
+
 void PutOrientation(DcmItem& item, const Grid& grid) {
   const Eigen::Vector3d right = grid.direction.col(0), down = grid.direction.col(1);
   Put(item, DCM_ImageOrientationPatient, EVR_DS,

@@ -29,7 +29,8 @@ void PutCode(DcmItem& item, const DcmTagKey& sequence, const DicomCode& code);
 std::string Decimal(double value);
 std::string Decimals(std::initializer_list<double> values);
 
-// How the planes k of the grid lie, but for their place.
+// Where the plane k of the grid lies, and how all of them do.
+void PutPosition(DcmItem& item, const Grid& grid, int k);
 void PutOrientation(DcmItem& item, const Grid& grid);
 void PutPixelSpacing(DcmItem& item, const Grid& grid);
 // How the voxels of such a plane are stored: whole numbers of `bits` bits.

@@ -97,8 +97,7 @@ Rescale RescaleOf(FrameTags& tags, size_t frame) {
 }
 
 // No frames where one or more do not say where they lie.
-void ReadFrames(const DataSet& set, DicomFile& file) {
-  FrameTags tags(set);
+void ReadFrames(const DataSet& set, FrameTags& tags, DicomFile& file) {
   const size_t count = DeclaredFrames(set), placed = tags.frame_count();
   if (placed > 0 && placed != count) file.miscounted = {count, placed};
   if (file.miscounted || (count > 1 && placed == 0)) return;
@@ -234,7 +233,7 @@ DicomContent ContentOf(const DataSet& set) {
   return other ? DicomContent::kOther : DicomContent::kBody;
 }
 
-void ReadSegments(const DataSet& set, DicomFile& file) {
+void ReadSegments(const DataSet& set, FrameTags& tags, DicomFile& file) {
   file.numbered = TextOf(set, kSopClass) == kLabelMap || TextOf(set, kSegmentationType) == "LABELMAP";
   if (file.numbered) return;
   if (TextOf(set, kSegmentationType) == "FRACTIONAL")
@@ -242,7 +241,6 @@ void ReadSegments(const DataSet& set, DicomFile& file) {
   DicomSequences alive;
   const auto segments = ItemsOf(set, kSegmentSequence, alive);
   const size_t only = segments.size() == 1 ? std::max<size_t>(1, NumberAt(*segments[0], kSegmentNumber)) : 0;
-  FrameTags tags(set);
   for (size_t f = 0; f < file.frames.size(); ++f) {
     const size_t segment = tags.Number(f, kSegmentOfFrame, kSegmentReferred);
     file.frames[f].segment = int(segment > 0 ? segment : only);
@@ -306,8 +304,9 @@ std::optional<DicomFile> ReadDicomHeader(const std::filesystem::path& path) {
   file.coloured = IsColour(TextOf(set, kShown));
   RequireHighBit(set);
   RequireNoTable(set);
-  ReadFrames(set, file);
-  if (content == DicomContent::kSegments) ReadSegments(set, file);
+  FrameTags tags(set);
+  ReadFrames(set, tags, file);
+  if (content == DicomContent::kSegments) ReadSegments(set, tags, file);
   file.inverted_from = InvertedFrom(set);
   if (file.inverted_from) RequireInvertedAsStored(reader.GetFile(), in);
   RequireAllVoxels(reader.GetFile(), in, file.frames.size());

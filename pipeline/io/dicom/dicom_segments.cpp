@@ -13,8 +13,7 @@ namespace {
 
 // The grid with the size in the plane, which all files must share.
 Grid WholeGrid(const std::vector<DicomFile>& files, const DicomSlices& placed) {
-  Grid grid = placed.grid;
-  grid.size = {files.front().columns, files.front().rows, int(placed.slices.back().plane) + 1};
+  const Grid grid = placed.GridOf(files.front().columns, files.front().rows);
   RequirePlausible(grid, VoxelType::kUint16, 0);
   for (const DicomFile& file : files) {
     if (file.columns != grid.size.x() || file.rows != grid.size.y())

@@ -33,8 +33,7 @@ ItkPlanes PlanesOf(const DicomFile& file, bool with_values) {
 
 // The grid with the size in the plane, which all files must share.
 Grid WholeGrid(const Series& series, const ItkPlanes& planes) {
-  Grid grid = series.placed.grid;
-  grid.size = {planes.columns, planes.rows, int(series.placed.slices.back().plane) + 1};
+  const Grid grid = series.placed.GridOf(planes.columns, planes.rows);
   RequirePlausible(grid, planes.type, 0);
   return grid;
 }

@@ -172,6 +172,12 @@ void RequireSegmentsOnce(const std::vector<DicomSlice>& slices) {
 
 }  // namespace
 
+Grid DicomSlices::GridOf(int columns, int rows) const {
+  Grid whole = grid;
+  whole.size = {columns, rows, int(slices.back().plane) + 1};
+  return whole;
+}
+
 bool Turned(const DicomFrame& a, const DicomFrame& b) {
   return std::max((a.along_row - b.along_row).norm(), (a.along_column - b.along_column).norm()) > 1e-3;
 }

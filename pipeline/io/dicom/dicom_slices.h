@@ -15,7 +15,8 @@ struct DicomSlice {
 
 struct DicomSlices {
   std::vector<DicomSlice> slices;  // by place along the normal
-  Grid grid;                       // without the size in the plane
+  Grid grid;                       // without its size
+  Grid GridOf(int columns, int rows) const;
 };
 
 // Whether two images do not lie in parallel planes, with rows alike.

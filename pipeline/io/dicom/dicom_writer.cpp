@@ -114,10 +114,9 @@ void PutValues(DcmItem& set, const std::string& modality, const DicomGreys& grey
 }
 
 void PutPlane(DcmItem& set, const Grid& grid, int k) {
-  const Eigen::Vector3d at = grid.ToMm(0, 0, k).lps;
   Put(set, DCM_InstanceNumber, EVR_IS, std::to_string(k + 1));
   Put(set, DCM_PatientOrientation, EVR_CS, "");
-  Put(set, DCM_ImagePositionPatient, EVR_DS, Decimals({at.x(), at.y(), at.z()}));
+  PutPosition(set, grid, k);
   PutOrientation(set, grid);
   PutPixelSpacing(set, grid);
   Put(set, DCM_SliceThickness, EVR_DS, Decimal(grid.spacing_mm.z()));

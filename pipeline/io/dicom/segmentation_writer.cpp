@@ -124,9 +124,7 @@ void PutFrame(DcmItem& set, const Grid& grid, const SegmentPlane& plane, const D
   const Uint32 indices[] = {Uint32(plane.number), Uint32(plane.plane + 1)};
   Require(AddItem(frame, DCM_FrameContentSequence)
               .putAndInsertUint32Array(DcmTag(DCM_DimensionIndexValues, EVR_UL), indices, 2));
-  const Eigen::Vector3d at = grid.ToMm(0, 0, plane.plane).lps;
-  Put(AddItem(frame, DCM_PlanePositionSequence), DCM_ImagePositionPatient, EVR_DS,
-      Decimals({at.x(), at.y(), at.z()}));
+  PutPosition(AddItem(frame, DCM_PlanePositionSequence), grid, plane.plane);
   Put(AddItem(frame, DCM_SegmentIdentificationSequence), DCM_ReferencedSegmentNumber, plane.number);
 }
 

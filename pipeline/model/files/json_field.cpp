@@ -71,10 +71,8 @@ std::string JsonField::Name() const {
 }
 
 std::string JsonField::Title() const {
-  constexpr size_t kLongestTitle = 256;
   const std::string title = Text();
-  const bool one_line = std::ranges::none_of(title, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
-  if (!one_line || title.size() > kLongestTitle) Fail("must be one line of at most 256 bytes");
+  if (!IsTitle(title)) Fail("must be one line of at most 256 bytes");
   return title;
 }
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "storage/blob_store.h"
+#include "storage/files/blob_store.h"
 #include "storage/resumable_uploads.h"
 
 namespace kvx {

@@ -1,7 +1,7 @@
 // What every inspector does with an archive: the folder it was unpacked into is a scan.
 #include "api/inspector_port.h"
 
-#include "storage/archive.h"
+#include "storage/files/archive.h"
 
 namespace kvx {
 

@@ -31,7 +31,7 @@ class ScanInspector {
   // `region` as of the subject: what the names are proposed from.
   virtual LabelFacts InspectLabels(const std::filesystem::path& file, const std::string& region,
                                    const std::string& project) = 0;
-  // Unpacks a packed series into a folder first. `unpacked` as of UnpackSeries (storage/archive.h).
+  // Unpacks a packed series into a folder first. `unpacked` as of UnpackSeries (storage/files/archive.h).
   virtual ScanFacts InspectSeries(const std::filesystem::path& archive, const std::filesystem::path& folder,
                                   const std::string& project, const std::function<void(size_t)>& unpacked);
 };

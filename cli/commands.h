@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "core/errors.h"
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 
 namespace CLI {
 class App;

@@ -3,8 +3,8 @@
 
 #include "core/blend.h"
 #include "core/errors.h"
-#include "kernels/device_buffer.h"
-#include "kernels/launch.h"
+#include "kernels/device/device_buffer.h"
+#include "kernels/device/launch.h"
 
 namespace kvx {
 namespace {

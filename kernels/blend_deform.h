@@ -2,7 +2,7 @@
 #pragma once
 #include "core/pose.h"
 #include "core/weight_map.h"
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 
 namespace kvx {
 

@@ -5,7 +5,7 @@
 
 #include "core/host/parallel.h"
 #include "core/voxels/cubic_spline.h"
-#include "kernels/launch.h"
+#include "kernels/device/launch.h"
 
 namespace kvx {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "kernels/block_level.h"
-#include "kernels/device_buffer.h"
+#include "kernels/device/device_buffer.h"
 
 namespace kvx {
 

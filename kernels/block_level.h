@@ -7,7 +7,7 @@
 
 #include "core/clamped_plate_spline.h"
 #include "core/image.h"
-#include "kernels/opencl.h"
+#include "kernels/device/opencl.h"
 
 namespace kvx {
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "kernels/launch.h"
+#include "kernels/device/launch.h"
 
 namespace kvx {
 namespace {

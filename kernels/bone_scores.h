@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/image.h"
-#include "kernels/device_buffer.h"
+#include "kernels/device/device_buffer.h"
 
 namespace kvx {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/weight_map.h"
-#include "kernels/device_buffer.h"
+#include "kernels/device/device_buffer.h"
 
 namespace kvx {
 

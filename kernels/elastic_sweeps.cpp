@@ -7,8 +7,8 @@
 #include <array>
 
 #include "core/host/parallel.h"
-#include "kernels/device_buffer.h"
-#include "kernels/launch.h"
+#include "kernels/device/device_buffer.h"
+#include "kernels/device/launch.h"
 
 namespace kvx {
 namespace {

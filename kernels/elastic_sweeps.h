@@ -2,7 +2,7 @@
 #pragma once
 #include <memory>
 
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 #include "kernels/elastic_lattice.h"
 
 namespace kvx {

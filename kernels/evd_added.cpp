@@ -1,7 +1,7 @@
 // The host side of kernels/cl/evd_added.cl.
 #include "kernels/evd_added.h"
 
-#include "kernels/launch.h"
+#include "kernels/device/launch.h"
 
 namespace kvx {
 namespace {

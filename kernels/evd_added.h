@@ -2,7 +2,7 @@
 #pragma once
 #include "kernels/added_displacement.h"
 #include "kernels/bricked_body.h"
-#include "kernels/buffer_pool.h"
+#include "kernels/device/buffer_pool.h"
 
 namespace kvx {
 

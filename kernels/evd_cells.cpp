@@ -5,7 +5,7 @@
 #include <array>
 #include <numeric>
 
-#include "kernels/launch.h"
+#include "kernels/device/launch.h"
 
 namespace kvx {
 namespace {

@@ -2,7 +2,7 @@
 #include "kernels/evd_forward.h"
 
 #include "core/blend.h"
-#include "kernels/launch.h"
+#include "kernels/device/launch.h"
 
 namespace kvx {
 namespace {

@@ -2,7 +2,7 @@
 #pragma once
 #include "core/pose.h"
 #include "kernels/bricked_body.h"
-#include "kernels/buffer_pool.h"
+#include "kernels/device/buffer_pool.h"
 #include "kernels/evd_added.h"
 
 namespace kvx {

@@ -1,8 +1,8 @@
 // The host side of kernels/cl/evd_pull.cl and evd_mend.cl.
 #include "kernels/evd_pull.h"
 
+#include "kernels/device/launch.h"
 #include "kernels/evd_specks.h"
-#include "kernels/launch.h"
 
 namespace kvx {
 namespace {

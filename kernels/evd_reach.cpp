@@ -6,7 +6,7 @@
 
 #include "core/blend.h"
 #include "core/voxels/to_corner.h"
-#include "kernels/launch.h"
+#include "kernels/device/launch.h"
 
 namespace kvx {
 

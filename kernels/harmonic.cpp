@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kernels/device_buffer.h"
-#include "kernels/launch.h"
+#include "kernels/device/device_buffer.h"
+#include "kernels/device/launch.h"
 
 namespace kvx {
 namespace {

@@ -1,7 +1,7 @@
 // The host side of kernels/cl/pyramid.cl.
 #include "kernels/pyramid.h"
 
-#include "kernels/launch.h"
+#include "kernels/device/launch.h"
 
 namespace kvx {
 namespace {

@@ -1,7 +1,7 @@
 // Smoothing and coarsening of volumes for the outer multiresolution, on the device.
 #pragma once
 #include "core/image.h"
-#include "kernels/device_buffer.h"
+#include "kernels/device/device_buffer.h"
 
 namespace kvx {
 

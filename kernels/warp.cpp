@@ -1,8 +1,8 @@
 // The host side of kernels/cl/warp_trilinear.cl.
 #include "kernels/warp.h"
 
-#include "kernels/device_buffer.h"
-#include "kernels/launch.h"
+#include "kernels/device/device_buffer.h"
+#include "kernels/device/launch.h"
 
 namespace kvx {
 

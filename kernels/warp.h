@@ -1,7 +1,7 @@
 // Resampling a volume through a displacement field, on the device.
 #pragma once
 #include "core/image.h"
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 
 namespace kvx {
 

@@ -11,7 +11,7 @@
 // clang-format on
 #pragma once
 #include "core/host/progress.h"
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 #include "pipeline/artifacts/core_fields.h"
 #include "pipeline/artifacts/stage_cache.h"
 

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 #include "server/http/http_server.h"
 #include "server/webhook_sender.h"
 

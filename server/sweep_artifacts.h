@@ -1,6 +1,6 @@
 // Artefacts that no model names any more: removed after a model was deleted, as soon as no build runs.
 #pragma once
-#include "storage/data_folder.h"
+#include "storage/files/data_folder.h"
 
 namespace kvx {
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "storage/database.h"
+#include "storage/database/database.h"
 
 namespace kvx {
 

@@ -2,7 +2,7 @@
 #include "storage/audit.h"
 
 #include "core/digest.h"
-#include "storage/sqlite.h"
+#include "storage/database/sqlite.h"
 
 namespace kvx {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "storage/database.h"
+#include "storage/database/database.h"
 #include "storage/page.h"
 #include "storage/project.h"
 

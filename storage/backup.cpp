@@ -16,13 +16,13 @@
 #include "core/digest.h"
 #include "core/errors.h"
 #include "core/text/hex_digest.h"
-#include "storage/blob_store.h"
-#include "storage/data_folder.h"
-#include "storage/database.h"
-#include "storage/flush_to_disk.h"
+#include "storage/database/database.h"
+#include "storage/database/open_for_reading.h"
+#include "storage/database/sqlite.h"
+#include "storage/files/blob_store.h"
+#include "storage/files/data_folder.h"
+#include "storage/files/flush_to_disk.h"
 #include "storage/ids.h"
-#include "storage/open_for_reading.h"
-#include "storage/sqlite.h"
 
 namespace kvx {
 namespace {

@@ -2,8 +2,8 @@
 #include "storage/catalogue.h"
 
 #include "core/errors.h"
+#include "storage/database/sqlite.h"
 #include "storage/ids.h"
-#include "storage/sqlite.h"
 
 namespace kvx {
 namespace {

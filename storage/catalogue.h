@@ -3,7 +3,7 @@
 #include <set>
 #include <string>
 
-#include "storage/database.h"
+#include "storage/database/database.h"
 #include "storage/page.h"
 #include "storage/project.h"
 

@@ -3,7 +3,7 @@
 #include "storage/idempotency.h"
 
 #include "core/errors.h"
-#include "storage/sqlite.h"
+#include "storage/database/sqlite.h"
 
 namespace kvx {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "core/digest.h"
-#include "storage/database.h"
+#include "storage/database/database.h"
 #include "storage/project.h"
 
 namespace kvx {

@@ -6,8 +6,8 @@
 #include <mutex>
 
 #include "core/errors.h"
+#include "storage/database/sqlite.h"
 #include "storage/ids.h"
-#include "storage/sqlite.h"
 
 namespace kvx {
 namespace {

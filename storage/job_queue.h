@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "storage/database.h"
+#include "storage/database/database.h"
 #include "storage/page.h"
 #include "storage/project.h"
 

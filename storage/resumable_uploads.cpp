@@ -7,8 +7,8 @@
 #include <mutex>
 #include <set>
 
+#include "storage/database/sqlite.h"
 #include "storage/ids.h"
-#include "storage/sqlite.h"
 
 namespace kvx {
 namespace {

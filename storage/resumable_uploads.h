@@ -8,7 +8,7 @@
 #include <string>
 
 #include "core/errors.h"
-#include "storage/database.h"
+#include "storage/database/database.h"
 
 namespace kvx {
 

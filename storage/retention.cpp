@@ -2,7 +2,7 @@
 #include "storage/retention.h"
 
 #include "core/errors.h"
-#include "storage/sqlite.h"
+#include "storage/database/sqlite.h"
 
 namespace kvx {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "storage/audit.h"
-#include "storage/blob_store.h"
-#include "storage/database.h"
+#include "storage/database/database.h"
+#include "storage/files/blob_store.h"
 
 namespace kvx {
 

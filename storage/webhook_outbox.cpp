@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "core/errors.h"
+#include "storage/database/sqlite.h"
 #include "storage/ids.h"
-#include "storage/sqlite.h"
 
 namespace kvx {
 namespace {

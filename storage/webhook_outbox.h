@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "storage/database.h"
+#include "storage/database/database.h"
 #include "storage/page.h"
 #include "storage/project.h"
 

@@ -39,6 +39,8 @@ PIPELINE_LINES = (
 # says otherwise.
 LINES = {
     "core": ("errors.h frames.h name.h", "host text", "numbers", "*", "voxels"),
+    "kernels": ("device", "*", "reference"),
+    "storage": ("ids.h project_shares.h", "files", "database", "*"),
     "server": (
         "address.h http_library.h log.h metrics.h sweep_artifacts.h",
         "access turns",
@@ -50,6 +52,7 @@ LINES = {
     "cli": ("commands.h", "terminal", "options", "service", "*"),
     "pipeline": PIPELINE_LINES,
     "pipeline/io": ("atomic_file.h itk_image.h layered_labels.h volume_info.h voxel_values.h zip_file.h", "dicom", "*"),
+    "pipeline/phantom": ("random.h trilinear.h", "anatomy", "motion", "*"),
     "pipeline/segmentation": ("cuts strokes names", "mr ct"),
     "pipeline/segmentation/mr": ("levels shells", "search"),
     "pipeline/bones": ("images bone_set", "template", "refine", "judge", "search"),
@@ -65,7 +68,7 @@ ONLY_IN = {
     r"SQLiteCpp/.*": "storage/ tests/",
     r"archive\w*\.h": "storage/ pipeline/io/ tests/",
     r"zstd\.h": "storage/ pipeline/artifacts/ tests/",
-    r"CL/.*": "kernels/opencl.h",
+    r"CL/.*": "kernels/device/opencl.h",
     r"CLI/.*|toml\+\+/.*": "cli/",
     r"cjose/.*": "server/ tests/support/",
     r"spdlog/.*": "server/log.cpp",

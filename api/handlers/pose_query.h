@@ -4,7 +4,7 @@
 
 #include "api/request.h"
 #include "api/services.h"
-#include "storage/content_encoding.h"
+#include "storage/files/content_encoding.h"
 
 namespace kvx {
 

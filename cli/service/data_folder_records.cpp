@@ -4,7 +4,7 @@
 #include <cstdio>
 
 #include "core/errors.h"
-#include "storage/data_folder.h"
+#include "storage/files/data_folder.h"
 
 namespace kvx {
 namespace {

@@ -1,4 +1,5 @@
-// A regular grid and trilinear sampling, shared by the kernels. Host layout: ClGrid in kernels/launch.h.
+// A regular grid and trilinear sampling, shared by the kernels. Host layout: ClGrid in
+// kernels/device/launch.h.
 
 #define KVX_ROUNDING 1e-3f  // of positions, in voxels
 

@@ -3,7 +3,7 @@
 #pragma once
 #include "core/image.h"
 #include "core/measures.h"
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 #include "pipeline/measures/similarity.h"
 
 namespace kvx {

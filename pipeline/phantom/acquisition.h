@@ -3,8 +3,8 @@
 #pragma once
 #include "core/host/progress.h"
 #include "core/image.h"
-#include "pipeline/phantom/composite_motion.h"
-#include "pipeline/phantom/tissue_intensity.h"
+#include "pipeline/phantom/anatomy/tissue_intensity.h"
+#include "pipeline/phantom/motion/composite_motion.h"
 
 namespace kvx::phantom {
 

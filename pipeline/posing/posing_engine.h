@@ -7,7 +7,7 @@
 #include "core/scan.h"
 #include "core/weight_map.h"
 #include "kernels/added_displacement.h"
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 #include "kernels/sampling.h"
 #include "pipeline/posing/resolved_pose.h"
 

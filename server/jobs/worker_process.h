@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 
 namespace kvx {
 

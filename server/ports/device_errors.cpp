@@ -8,7 +8,7 @@
 #include <system_error>
 
 #include "core/errors.h"
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 
 namespace kvx {
 namespace {

@@ -5,10 +5,10 @@
 #include <semaphore>
 
 #include "api/ports.h"
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 #include "pipeline/model/model.h"
 #include "server/turns/posing_gate.h"
-#include "storage/data_folder.h"
+#include "storage/files/data_folder.h"
 
 namespace kvx {
 

@@ -2,7 +2,7 @@
 #include "server/ports/study_folder.h"
 
 #include "core/errors.h"
-#include "storage/blob_store.h"
+#include "storage/files/blob_store.h"
 #include "storage/ids.h"
 
 namespace kvx {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "api/builder_port.h"
-#include "storage/data_folder.h"
+#include "storage/files/data_folder.h"
 
 namespace kvx {
 

@@ -8,10 +8,10 @@
 #include "core/errors.h"
 #include "storage/api_keys.h"
 #include "storage/catalogue.h"
+#include "storage/database/sqlite.h"
 #include "storage/idempotency.h"
 #include "storage/job_queue.h"
 #include "storage/retention.h"
-#include "storage/sqlite.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

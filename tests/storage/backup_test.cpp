@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "core/errors.h"
-#include "storage/sqlite.h"
+#include "storage/database/sqlite.h"
 #include "storage/stores.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/refusal.h"

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "core/errors.h"
-#include "storage/data_folder.h"
+#include "storage/files/data_folder.h"
 #include "storage/webhook_outbox.h"
 #include "tests/support/fixtures.h"
 

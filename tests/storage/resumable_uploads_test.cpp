@@ -5,8 +5,8 @@
 
 #include <fstream>
 
-#include "storage/blob_store.h"
 #include "storage/catalogue.h"
+#include "storage/files/blob_store.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

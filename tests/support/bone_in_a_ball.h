@@ -1,7 +1,7 @@
 // A ball of tissue around a rod of bone, without mechanics: tissue stays where it is and slides over the rod,
 // which goes where a test says.
 #pragma once
-#include "pipeline/phantom/composite_motion.h"
+#include "pipeline/phantom/motion/composite_motion.h"
 
 namespace kvx::testing_support {
 

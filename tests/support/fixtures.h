@@ -5,7 +5,7 @@
 
 #include "core/image.h"
 #include "core/rigid_transform.h"
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 
 namespace kvx::testing_support {
 

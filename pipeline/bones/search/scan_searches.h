@@ -3,7 +3,7 @@
 #include <map>
 #include <string>
 
-#include "kernels/backend.h"
+#include "kernels/device/backend.h"
 #include "pipeline/bones/search/find_bones.h"
 
 namespace kvx {

@@ -1,4 +1,4 @@
-// A series on its way to a service: the other way than UnpackSeries (storage/archive.h).
+// A series on its way to a service: the other way than UnpackSeries (storage/files/archive.h).
 #pragma once
 #include <filesystem>
 

@@ -3,8 +3,8 @@
 #include <limits>
 
 #include "core/host/progress.h"
-#include "kernels/backend.h"
 #include "kernels/block_level.h"
+#include "kernels/device/backend.h"
 #include "pipeline/registration/blocks/block_solver.h"
 
 namespace kvx {

@@ -1,8 +1,8 @@
 // One resolution of the published method: initialised template and scan on the scan's grid, and its blocks.
 #pragma once
 #include "core/image.h"
-#include "kernels/backend.h"
 #include "kernels/block_level.h"
+#include "kernels/device/backend.h"
 
 namespace kvx {
 

@@ -7,7 +7,7 @@
 
 #include "core/digest.h"
 #include "core/errors.h"
-#include "storage/archive.h"
+#include "storage/files/archive.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

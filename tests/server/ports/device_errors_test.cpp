@@ -11,7 +11,7 @@
 #include <system_error>
 
 #include "core/errors.h"
-#include "kernels/opencl.h"
+#include "kernels/device/opencl.h"
 
 namespace kvx {
 namespace {

@@ -8,7 +8,7 @@
 #include <filesystem>
 
 #include "core/host/parallel.h"
-#include "kernels/device_buffer.h"
+#include "kernels/device/device_buffer.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/host/parallel.h"
+#include "core/voxels/components.h"
 #include "core/voxels/distance_transform.h"
 
 namespace kvx {
@@ -52,5 +53,7 @@ Mask Dilated(const Mask& mask, double radius_mm) {
   ParallelEach(out.values.size(), [&](size_t v) { out.values[v] = squared_mm.values[v] <= reach2; });
   return out;
 }
+
+Mask Eroded(const Mask& mask, double radius_mm) { return Complement(Dilated(Complement(mask), radius_mm)); }
 
 }  // namespace kvx

@@ -12,5 +12,8 @@ Mask Eroded(const Mask& mask);
 
 // With every voxel whose centre is at most `radius_mm` from that of one of the mask's (Euclidean, exact).
 Mask Dilated(const Mask& mask, double radius_mm);
+// Without every voxel whose centre is at most `radius_mm` from that of one the mask leaves out. What lies
+// outside the grid does not count.
+Mask Eroded(const Mask& mask, double radius_mm);
 
 }  // namespace kvx

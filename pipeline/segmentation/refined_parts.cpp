@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <numeric>
+#include <set>
 
 #include "core/voxels/components.h"
 #include "core/voxels/dilated.h"
 #include "core/voxels/distance_transform.h"
 #include "core/voxels/grid_lines.h"
+#include "pipeline/segmentation/ct/neck_parts.h"
+#include "pipeline/segmentation/ct/shell_shapes.h"
 #include "pipeline/segmentation/grow_bones.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 
@@ -26,21 +29,58 @@ Mask Borders(const LabelMap& parts) {
   return borders;
 }
 
-// Numbers from that of background strokes on are left to themselves: so many parts are no skeleton's.
-LabelMap DeepVoxels(const LabelMap& parts) {
-  const Volume depth_mm = DistanceMapMm(Borders(parts));
-  std::vector<float> deepest(kBackgroundStroke, 0.0f);
-  for (size_t v = 0; v < parts.values.size(); ++v) {
-    if (parts.values[v] < kBackgroundStroke)
-      deepest[parts.values[v]] = std::max(deepest[parts.values[v]], depth_mm.values[v]);
+// Parts with a number below that of background strokes; so many are no skeleton's.
+struct PartSizes {
+  std::vector<double> mm3 = std::vector<double>(kBackgroundStroke, 0.0);
+  std::vector<float> deepest_mm =
+      std::vector<float>(kBackgroundStroke, 0.0f);  // from the voxels at the border
+
+  PartSizes(const LabelMap& parts, const Volume& depth_mm) {
+    for (size_t v = 0; v < parts.values.size(); ++v) {
+      const uint16_t part = parts.values[v];
+      if (part == 0 || part >= kBackgroundStroke) continue;
+      mm3[part] += parts.grid.spacing_mm.prod();
+      deepest_mm[part] = std::max(deepest_mm[part], depth_mm.values[v]);
+    }
   }
-  LabelMap deep(parts.grid);
+  std::set<int> Shells(double voxel_mm) const {
+    std::set<int> shells;
+    for (int part = 1; part < kBackgroundStroke; ++part)
+      if (mm3[part] > 0 && !IsSolid(mm3[part], deepest_mm[part] + 0.5 * voxel_mm)) shells.insert(part);
+    return shells;
+  }
+};
+
+// What stands for strokes: of solid parts the deep half, of others all but the border.
+LabelMap SureVoxels(const LabelMap& parts, const Volume& depth_mm, const PartSizes& sizes,
+                    const std::set<int>& shells) {
+  LabelMap sure(parts.grid);
   for (size_t v = 0; v < parts.values.size(); ++v) {
     const uint16_t part = parts.values[v];
-    if (part != 0 && part < kBackgroundStroke && depth_mm.values[v] >= kDeep * deepest[part])
-      deep.values[v] = part;
+    if (part == 0 || part >= kBackgroundStroke) continue;
+    const float depth = depth_mm.values[v];
+    if (shells.contains(part) ? depth > 0 : depth >= kDeep * sizes.deepest_mm[part]) sure.values[v] = part;
   }
-  return deep;
+  return sure;
+}
+
+void AddMarrow(const std::map<int, ShellShape>& shapes, LabelMap& sure) {
+  for (const auto& [label, shape] : shapes) {
+    ForEachVoxel(shape.box, sure.grid, [&](const Eigen::Vector3i&, size_t here, size_t v) {
+      if (shape.marrow.values[here]) sure.values[v] = uint16_t(label);
+    });
+  }
+}
+
+void KeepWithinReach(const std::map<int, ShellShape>& shapes, LabelMap& bones) {
+  Mask within(bones.grid);
+  for (const auto& [label, shape] : shapes) {
+    ForEachVoxel(shape.box, bones.grid, [&](const Eigen::Vector3i&, size_t here, size_t v) {
+      if (bones.values[v] == label && shape.reach.values[here]) within.values[v] = 1;
+    });
+  }
+  for (size_t v = 0; v < bones.values.size(); ++v)
+    if (!within.values[v] && shapes.contains(bones.values[v])) bones.values[v] = 0;
 }
 
 LabelMap Others(LabelMap parts) {
@@ -89,9 +129,17 @@ void GiveBackMoreThanBorders(const Volume& scan_hu, const LabelMap& parts, Label
 
 }  // namespace
 
-LabelMap RefinedParts(const Volume& scan_hu, const LabelMap& parts, const Progress& progress) {
+LabelMap RefinedParts(const Volume& scan_hu, const LabelMap& parts, double level_hu,
+                      const Progress& progress) {
+  const Volume depth_mm = DistanceMapMm(Borders(parts));
+  const PartSizes sizes(parts, depth_mm);
+  const std::set<int> shells = sizes.Shells(parts.grid.MeanSpacingMm());
+  const std::map<int, ShellShape> shapes = ShapesOfShells(scan_hu, parts, shells, level_hu);
+  LabelMap sure = SureVoxels(parts, depth_mm, sizes, shells);
+  AddMarrow(shapes, sure);
   const LabelMap others = Others(parts);
-  LabelMap refined = GrowBones(scan_hu, DeepVoxels(parts), true, progress, &others).labels;
+  LabelMap refined = GrowBones(scan_hu, sure, true, progress, &others).labels;
+  KeepWithinReach(shapes, refined);
   GiveBackMoreThanBorders(scan_hu, parts, refined);
   return NumberedBySize(std::move(refined));
 }

@@ -31,17 +31,18 @@ void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
   }
 }
 
-// Parts that hang on the level are not looked at again: what their deep voxels stand for is not known.
+// Parts that are not sure are not looked at again: what their deep voxels stand for is not known.
 SegmentedBones BonesByThreshold(const Volume& scan_hu, double level_hu, const Progress& progress) {
   SegmentedBones bones{ThresholdBones(scan_hu, level_hu), {}, true, {}, {}};
   progress.Report(SegmentBones::kName, 0.2);
-  if (KeptAtOtherLevels(scan_hu, level_hu) < kSurelyKept) {
+  if (KeptOtherwise(scan_hu, level_hu) < kSurelyKept) {
     bones.warnings.push_back(
-        "a threshold a little higher or lower parts this scan otherwise: bones may be joined, or in pieces; "
+        "where bones meet in this scan is not sure (a threshold a little higher or lower, say, parts it "
+        "otherwise): bones may be joined, or in pieces; "
         "check the labels, and draw strokes (seeds) instead where they are wrong");
     return bones;
   }
-  bones.labels = RefinedParts(scan_hu, bones.labels, progress.Part(0.3, 1.0));
+  bones.labels = RefinedParts(scan_hu, bones.labels, level_hu, progress.Part(0.3, 1.0));
   if (scan_hu.grid.spacing_mm.maxCoeff() > kGapMm) {
     bones.warnings.push_back(
         "the voxels are as thick as the gaps of joints, so bones that touch may not have come apart; check "

@@ -14,9 +14,9 @@ namespace {
 constexpr size_t kMostBlocks = 2'000'000;
 constexpr double kALittle = 0.15;  // of the level
 
-LabelMap PartsAt(const Volume& scan_hu, double level_hu) {
+LabelMap PartsAt(const Volume& scan_hu, double level_hu, double least_seam = kLeastSeam) {
   try {
-    return ThresholdBones(scan_hu, level_hu);
+    return ThresholdBones(scan_hu, level_hu, least_seam);
   } catch (const InputError&) {  // nothing is as dense
     return LabelMap(scan_hu.grid);
   }
@@ -42,12 +42,13 @@ double Kept(const LabelMap& parts, const LabelMap& others) {
 
 }  // namespace
 
-double KeptAtOtherLevels(const Volume& scan_hu, double level_hu) {
+double KeptOtherwise(const Volume& scan_hu, double level_hu) {
   const VoxelBox all{Eigen::Vector3i::Zero(), scan_hu.grid.size};
   const Volume blocks = Coarser(scan_hu, {all, BlocksFor(all, scan_hu.grid, kMostBlocks).back()});
   const LabelMap parts = PartsAt(blocks, level_hu);
-  return std::max(Kept(parts, PartsAt(blocks, (1 - kALittle) * level_hu)),
-                  Kept(parts, PartsAt(blocks, (1 + kALittle) * level_hu)));
+  const double at_other_levels = std::max(Kept(parts, PartsAt(blocks, (1 - kALittle) * level_hu)),
+                                          Kept(parts, PartsAt(blocks, (1 + kALittle) * level_hu)));
+  return std::min(at_other_levels, Kept(parts, PartsAt(blocks, level_hu, 0.5 * kLeastSeam)));
 }
 
 }  // namespace kvx

@@ -39,7 +39,7 @@ TEST(RefinedParts, BordersMoveToWhereTheDensityFallsAndTheLargestComesFirst) {
     if (ToBallMm(parts.grid, v, 29, 9) < 1.2) parts.values[v] = 2;
     if (parts.grid.Ijk(v).x() < 22 && ToBallMm(parts.grid, v, 11.5, 7) < 4) parts.values[v] = 1;
   }
-  const LabelMap refined = RefinedParts(balls.scan, parts, {});
+  const LabelMap refined = RefinedParts(balls.scan, parts, kLevelHu, {});
   size_t wrong = 0, before = 0, bone = 0;
   for (size_t v = 0; v < parts.values.size(); ++v) {
     bone += balls.truth.values[v] != 0;
@@ -65,7 +65,7 @@ TEST(RefinedParts, AThinShaftStaysWithItsThickEnd) {
     scan.values[v] = grid.Ijk(v).y() < 2 ? -1000.0f : d > 0 ? 50.0f : d > -3 ? 900.0f : -60.0f;
     bone += truth.values[v] = d < 0;
   }
-  const LabelMap refined = RefinedParts(scan, truth, {});
+  const LabelMap refined = RefinedParts(scan, truth, kLevelHu, {});
   size_t kept = 0;
   for (size_t v = 0; v < truth.values.size(); ++v) kept += truth.values[v] && refined.values[v] == 1;
   EXPECT_GT(double(kept), 0.97 * double(bone));
@@ -76,7 +76,7 @@ TEST(RefinedParts, PartsBeyondTheNumbersOfStrokesStayAsTheyAre) {
   LabelMap parts = balls.truth;
   const size_t lone = parts.grid.Index(42, 27, 25);
   parts.values[lone] = 300;
-  const LabelMap refined = RefinedParts(balls.scan, parts, {});
+  const LabelMap refined = RefinedParts(balls.scan, parts, kLevelHu, {});
   EXPECT_EQ(refined.values[lone], 3) << "the smallest of three";
 }
 

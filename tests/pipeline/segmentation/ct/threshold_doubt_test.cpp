@@ -17,29 +17,29 @@ Volume SoftTissue() {
   return Volume(grid, 40.0f);
 }
 
-TEST(KeptAtOtherLevels, ABallStaysTheSame) {
+TEST(KeptOtherwise, ABallStaysTheSame) {
   Volume scan = SoftTissue();
   for (size_t v = 0; v < scan.values.size(); ++v) {
     const Eigen::Vector3d mm = scan.grid.Ijk(v).cast<double>().cwiseProduct(scan.grid.spacing_mm);
     if ((mm - Eigen::Vector3d(30, 15, 15)).norm() < 9) scan.values[v] = 900;
   }
-  EXPECT_NEAR(KeptAtOtherLevels(scan, kLevelHu), 1, 1e-6);
+  EXPECT_NEAR(KeptOtherwise(scan, kLevelHu), 1, 1e-6);
 }
 
 // At the level it is in pieces half as long as its waves; a little lower it is whole, a little higher the
 // pieces are a third shorter.
-TEST(KeptAtOtherLevels, ABarOfUnevenDensityDoesNot) {
+TEST(KeptOtherwise, ABarOfUnevenDensityDoesNot) {
   Volume scan = SoftTissue();
   for (size_t v = 0; v < scan.values.size(); ++v) {
     const Eigen::Vector3i p = scan.grid.Ijk(v);
     if (p.y() < 8 || p.y() > 20 || p.z() < 8 || p.z() > 18) continue;
     scan.values[v] = float(kLevelHu + 50 * std::sin(2 * M_PI * p.x() / 20));
   }
-  EXPECT_LT(KeptAtOtherLevels(scan, kLevelHu), 0.75);
+  EXPECT_LT(KeptOtherwise(scan, kLevelHu), 0.75);
 }
 
-TEST(KeptAtOtherLevels, IsNothingWhereNothingIsDense) {
-  EXPECT_EQ(KeptAtOtherLevels(SoftTissue(), kLevelHu), 0);
+TEST(KeptOtherwise, IsNothingWhereNothingIsDense) {
+  EXPECT_EQ(KeptOtherwise(SoftTissue(), kLevelHu), 0);
 }
 
 }  // namespace

@@ -51,15 +51,14 @@ struct PartSizes {
   }
 };
 
-// What stands for strokes: of solid parts the deep half, of others all but the border.
+// What stands for strokes: of solid parts the deep half, of shells and meshes, where nothing is deep, all.
 LabelMap SureVoxels(const LabelMap& parts, const Volume& depth_mm, const PartSizes& sizes,
                     const std::set<int>& shells) {
   LabelMap sure(parts.grid);
   for (size_t v = 0; v < parts.values.size(); ++v) {
     const uint16_t part = parts.values[v];
     if (part == 0 || part >= kBackgroundStroke) continue;
-    const float depth = depth_mm.values[v];
-    if (shells.contains(part) ? depth > 0 : depth >= kDeep * sizes.deepest_mm[part]) sure.values[v] = part;
+    if (shells.contains(part) || depth_mm.values[v] >= kDeep * sizes.deepest_mm[part]) sure.values[v] = part;
   }
   return sure;
 }

@@ -76,5 +76,19 @@ TEST(Dilated, NothingStaysNothing) {
             std::ptrdiff_t(dilated.values.size()));
 }
 
+// A slab of 8 mm that the view cuts on all other sides.
+TEST(Eroded, GivesWayFromWhatTheMaskLeavesOutAlone) {
+  Grid grid;
+  grid.size = {24, 5, 4};
+  grid.spacing_mm = {0.5, 1.0, 2.0};
+  Mask slab(grid);
+  for (size_t v = 0; v < slab.values.size(); ++v)
+    slab.values[v] = grid.Ijk(v).x() >= 4 && grid.Ijk(v).x() < 20;
+  const Mask eroded = Eroded(slab, 1.0);
+  for (size_t v = 0; v < slab.values.size(); ++v)
+    EXPECT_EQ(int(eroded.values[v]), grid.Ijk(v).x() >= 6 && grid.Ijk(v).x() < 18) << grid.Ijk(v).transpose();
+  EXPECT_EQ(Eroded(Mask(grid, 1), 3.0).values, Mask(grid, 1).values);
+}
+
 }  // namespace
 }  // namespace kvx

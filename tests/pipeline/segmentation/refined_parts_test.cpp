@@ -6,6 +6,8 @@
 namespace kvx {
 namespace {
 
+constexpr double kLevelHu = 300;
+
 Grid SmallGrid() {
   Grid grid;
   grid.size = {46, 30, 28};

@@ -6,6 +6,7 @@
 
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
+#include "tests/support/dice.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/refusal.h"
 
@@ -58,6 +59,62 @@ TEST(SegmentBones, AScanIsNoPreviousLabelMap) {
   WriteLabels(file, map);
   EXPECT_THAT(testing_support::RefusalOf<InputError>([&] { ReadPreviousLabels(file, map.grid); }),
               testing::HasSubstr("previous label map holds greys"));
+}
+
+// A real CT of a wrist's bones (greys are HU + 1024, 0 around), cut out and laid into soft tissue, with air
+// at one side.
+struct RealBones {
+  Scan scan;
+  LabelMap truth;  // one label for all
+
+  explicit RealBones(const std::string& name) {
+    const Volume crop =
+        ReadScan(testing_support::SharedData() / "wrist-bone-ct-crops" / (name + ".nii.gz")).volume;
+    constexpr int kMargin = 12;
+    Grid grid = crop.grid;
+    grid.size += Eigen::Vector3i(2 * kMargin, 2 * kMargin, 4);
+    scan.volume = Volume(grid, 40.0f);
+    truth = LabelMap(grid);
+    for (size_t v = 0; v < truth.values.size(); ++v) {
+      const Eigen::Vector3i p = grid.Ijk(v) - Eigen::Vector3i(kMargin, kMargin, 2);
+      if (p.y() < 4 - kMargin) scan.volume.values[v] = -1000;
+      if (!crop.grid.Contains(p) || crop(p.x(), p.y(), p.z()) <= 0) continue;
+      scan.volume.values[v] = crop(p.x(), p.y(), p.z()) - 1024;
+      truth.values[v] = 1;
+    }
+  }
+  SegmentedBones ByThreshold() const {
+    StageContext context{testing_support::SharedBackend(), {}};
+    const Artifact<Scan> loaded{{}, std::make_shared<const Scan>(scan)};
+    return SegmentBones::Run({.scan = loaded, .strokes_content = {}, .strokes_path = {}}, {}, context);
+  }
+};
+
+std::vector<size_t> VoxelsByLabel(const LabelMap& labels) {
+  std::vector<size_t> voxels(size_t(*std::ranges::max_element(labels.values)) + 1, 0);
+  for (const uint16_t label : labels.values) ++voxels[label];
+  return voxels;
+}
+
+TEST(SegmentBones, ARealBoneWithMarrowAndSpongyEndsIsOneByThreshold) {
+  if (!testing_support::HasSharedData()) GTEST_SKIP() << "no shared data here";
+  const RealBones metacarpal("mc3");
+  const SegmentedBones found = metacarpal.ByThreshold();
+  EXPECT_THAT(found.warnings, testing::IsEmpty());
+  EXPECT_EQ(VoxelsByLabel(found.labels).size(), 2u);
+  EXPECT_GT(testing_support::Dice(found.labels, metacarpal.truth, 1), 0.97);
+}
+
+TEST(SegmentBones, RealBonesSideBySideAreTwoByThreshold) {
+  if (!testing_support::HasSharedData()) GTEST_SKIP() << "no shared data here";
+  const RealBones metacarpals("mc2_mc3");
+  const LabelMap found = metacarpals.ByThreshold().labels;
+  const std::vector<size_t> voxels = VoxelsByLabel(found);
+  ASSERT_EQ(voxels.size(), 3u);
+  EXPECT_GT(double(voxels[2]), 0.8 * double(voxels[1])) << "one is about as large as the other";
+  LabelMap all = found;
+  for (uint16_t& label : all.values) label = label != 0;
+  EXPECT_GT(testing_support::Dice(all, metacarpals.truth, 1), 0.97);
 }
 
 }  // namespace

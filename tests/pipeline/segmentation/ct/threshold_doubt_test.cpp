@@ -38,9 +38,7 @@ TEST(KeptOtherwise, ABarOfUnevenDensityDoesNot) {
   EXPECT_LT(KeptOtherwise(scan, kLevelHu), 0.75);
 }
 
-TEST(KeptOtherwise, IsNothingWhereNothingIsDense) {
-  EXPECT_EQ(KeptOtherwise(SoftTissue(), kLevelHu), 0);
-}
+TEST(KeptOtherwise, IsNothingWhereNothingIsDense) { EXPECT_EQ(KeptOtherwise(SoftTissue(), kLevelHu), 0); }
 
 }  // namespace
 }  // namespace kvx

@@ -21,7 +21,7 @@ struct Scales {
         beyond_mm(std::max(kBeyondMm, kBeyondVoxels * grid.MeanSpacingMm())) {}
 };
 
-Mask Enclosed(const Mask& shell, double gap_mm) { return FillHoles(Eroded(Dilated(shell, gap_mm), gap_mm)); }
+Mask Enclosed(const Mask& shell, double gap_mm) { return Eroded(FillHoles(Dilated(shell, gap_mm)), gap_mm); }
 
 ShellShape ShapeOf(const Volume& scan_hu, const LabelMap& parts, int label, const VoxelBox& of_label,
                    double thin_hu) {

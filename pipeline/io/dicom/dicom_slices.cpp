@@ -9,7 +9,7 @@
 namespace kvx {
 namespace {
 
-constexpr size_t kMostPlanes = 100'000;
+constexpr double kMostPlanes = 100'000;
 constexpr double kSlackMm = 1e-6;      // of sums of decimal numbers
 constexpr double kSamePlaceMm = 0.01;  // slices are farther apart than this
 constexpr double kMostAstray = 0.25;   // of a voxel, of any slice from its place in the grid
@@ -73,8 +73,9 @@ EvenPlanes SparsePlanes(const std::vector<double>& places_mm, double said_mm) {
   const double about_mm = as_said ? said_mm : least;
   EvenPlanes planes{{0}, 0};
   for (const double step : steps) {
-    planes.plane_of.push_back(planes.plane_of.back() + size_t(std::round(step / about_mm)));
-    if (planes.plane_of.back() > kMostPlanes) throw InputError(kUneven);
+    const double plane = double(planes.plane_of.back()) + std::round(step / about_mm);
+    if (!(plane <= kMostPlanes)) throw InputError(kUneven);
+    planes.plane_of.push_back(size_t(plane));
   }
   planes.step_mm = (places_mm.back() - places_mm.front()) / double(planes.plane_of.back());
   for (size_t s = 0; s < steps.size(); ++s) {

@@ -112,6 +112,7 @@ TEST_F(DicomSegments, PlanesThatASegmentationLeavesOutAreEmpty) {
   EXPECT_EQ(Read({.places = {4, 8}}).labels.grid.spacing_mm.z(), 4);
   EXPECT_EQ(Read({.places = {4, 8}, .between = "2"}).labels.grid.size.z(), 3) << "its own word";
   EXPECT_THAT(ComplaintOf({.places = {0, 4, 10}}), HasSubstr("unevenly spaced"));
+  EXPECT_THAT(ComplaintOf({.places = {4, 8}, .between = "1e-30"}), HasSubstr("unevenly spaced"));
   EXPECT_THAT(ComplaintOf({.segments = 3, .places = {4}}), HasSubstr("a single slice"));
 }
 

@@ -7,6 +7,7 @@
 
 #include "api/request.h"
 #include "core/errors.h"
+#include "core/farthest_place.h"
 
 namespace kvx {
 namespace {
@@ -34,6 +35,8 @@ PointMm PointOf(const Json& item) {
       throw InputError("each of 'points' is three numbers, or three nulls");
     point.lps[axis] = item[size_t(axis)].get<double>();
   }
+  if (LiesTooFar(point))
+    throw InputError("one of 'points' is more than a kilometre away; their numbers are in mm");
   return point;
 }
 

@@ -38,7 +38,7 @@ PIPELINE_LINES = (
 # The same inside of folders; "*" is what lies in such a folder itself, which is above all of its folders where no line
 # says otherwise.
 LINES = {
-    "core": ("errors.h frames.h name.h", "host text", "numbers", "*", "voxels"),
+    "core": ("errors.h farthest_place.h frames.h name.h", "host text", "numbers", "*", "voxels"),
     "kernels": ("device", "*", "reference"),
     "storage": ("ids.h project_shares.h", "files", "database", "*"),
     "server": (

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/errors.h"
+#include "core/farthest_place.h"
 #include "core/text/csv_reader.h"
 #include "core/text/lower_case.h"
 #include "core/text/parse_number.h"
@@ -14,6 +15,7 @@ namespace kvx {
 namespace {
 
 constexpr const char* kNotNumbers = "x, y and z must be numbers (LPS mm)";
+constexpr const char* kTooFar = "the point is more than a kilometre away; its numbers are in mm";
 double Number(const CsvReader& reader, std::string_view field, size_t line) {
   const std::string text = reader.NumberText(field, line);
   const std::optional<double> value = ParseAs<double>(text);
@@ -54,6 +56,7 @@ void AddRow(const CsvReader& reader, const CsvRecord& record, size_t line, Point
   if (record.size() < 3) reader.ThrowAt(line, kNotNumbers);
   for (int axis = 0; axis < 3; ++axis) point.lps[axis] = Number(reader, record[size_t(axis)], line);
   if (point.lps.array().isNaN().any() && !point.lps.array().isNaN().all()) reader.ThrowAt(line, kNotNumbers);
+  if (LiesTooFar(point)) reader.ThrowAt(line, kTooFar);
   table.points.push_back(point);
   table.extra.push_back(ExtraOf(record, reader.separator()));
 }

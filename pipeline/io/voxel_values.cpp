@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/errors.h"
+#include "core/farthest_place.h"
 
 namespace kvx {
 namespace {
@@ -217,6 +218,10 @@ void RequirePlausible(const Grid& grid, VoxelType type, double available_bytes) 
   }
   if (!grid.origin.lps.allFinite())
     throw InputError("the volume's header gives an origin that is not finite");
+  if (LiesTooFar(grid.origin)) {
+    throw InputError(
+        "the volume's header gives an origin that is more than a kilometre away; correct it, it is in mm");
+  }
   Validate(grid);
   const double longest_mm = grid.spacing_mm.cwiseProduct(grid.size.cast<double>()).maxCoeff();
   if (longest_mm < kSmallestMm || longest_mm > kLargestMm) {

@@ -4,13 +4,13 @@
 #include <algorithm>
 
 #include "core/errors.h"
+#include "core/farthest_place.h"
 #include "core/text/listed.h"
 
 namespace kvx {
 namespace {
 
 constexpr double kLargestValue = 2 * kPi;  // of a turn, or as many mm of a shift as degrees
-constexpr double kLargestShiftMm = 1e6;    // of a bone: two scans' origins may lie metres apart
 
 int IndexIn(const std::vector<std::string>& names, const std::string& name) {
   return int(std::find(names.begin(), names.end(), name) - names.begin());
@@ -29,7 +29,7 @@ struct Resolving {
   ResolvedPose operator()(const BonePose& asked) const {
     for (const auto& [name, motion] : asked.scan_from_template) {
       RequireBone(name);
-      if (!(motion.translation_mm.cwiseAbs().maxCoeff() <= kLargestShiftMm))
+      if (!(motion.translation_mm.cwiseAbs().maxCoeff() <= kFarthestMm))
         throw InputError("the transform of bone '" + name +
                          "' moves it by more than a kilometre; it is in mm");
     }

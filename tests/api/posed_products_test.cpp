@@ -329,6 +329,8 @@ TEST(Points, CsvKeepsOrderAndFurtherColumns) {
   EXPECT_THAT(RefusalOf([] { PointsOfCsv(" {\"points\":[]}"); }), testing::HasSubstr("application/json"));
   EXPECT_THROW(PointsOfJson(R"({"points":[[1,2]]})"), InputError);
   EXPECT_THROW(PointsOfJson(R"({"points":[[1,null,3]]})"), InputError);
+  EXPECT_THAT(RefusalOf([] { PointsOfJson(R"({"points":[[0,0,0],[1.7e308,-1.7e308,0]]})"); }),
+              testing::HasSubstr("kilometre"));
 }
 
 TEST(Points, AreCountedBeforeTheyTakeMemory) {

@@ -24,7 +24,7 @@ TEST(PointsCsv, FurtherColumnsAreCarriedThroughVerbatim) {
 
 TEST(PointsCsv, NumbersComeBackExactly) {
   PointTable table;
-  table.points = {{Eigen::Vector3d(1.0 / 3, -1e-17, 123456789.123456789)}};
+  table.points = {{Eigen::Vector3d(1.0 / 3, -1e-17, 123456.789123456789)}};
   table.extra = {""};
   EXPECT_EQ(ParsePoints(FormatPoints(table)).points[0].lps, table.points[0].lps);
 }
@@ -46,6 +46,12 @@ TEST(PointsCsv, PointsThatAreNowhereStayWhereTheyAreInTheTable) {
     return points;
   });
   EXPECT_EQ(FormatPoints(table), "x,y,z,id\n2,4,6,a\nnan,nan,nan,b\n8,10,12,c\n");
+}
+
+TEST(PointsCsv, APointBeyondAllMeasureIsRefused) {
+  EXPECT_EQ(ParsePoints("x,y,z\n1e6,-1e6,0\n").points.size(), 1u);
+  EXPECT_THAT([] { ParsePoints("x,y,z\n1,2,3\n1.7e308,-1.7e308,0\n"); },
+              ThrowsMessage<InputError>(testing::AllOf(HasSubstr("line 3:"), HasSubstr("kilometre"))));
 }
 
 // RFC 4180: a quote opens a field only where the field begins.

@@ -108,6 +108,7 @@ TEST_F(BadNifti, OneBrokenFieldAtATime) {
        "smaller than a millimetre"},
       {"no forms, longer than any scanner", [&] { Set<int32_t>(252, 0), Set<float>(80, 300); },
        "longer than three metres"},
+      {"beyond all measure", [&] { Set<float>(292, 3e38f); }, "a kilometre away"},
       {"sform not a number", [&] { Set<float>(280, nan); }, "header is damaged"},
       {"sform flat",
        [&] {

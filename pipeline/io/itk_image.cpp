@@ -22,8 +22,18 @@ namespace {
 const char kUnreadable[] =
     "the file is not a readable volume; check that it was copied whole and has the right extension";
 
+// What ITK's objects share is made with the first of them, which must not happen on two threads at once. Its
+// warnings are for programmers, and quote paths and headers.
+void PrepareItk() {
+  [[maybe_unused]] static const bool prepared = [] {
+    itk::Object::SetGlobalWarningDisplay(false);
+    itk::NrrdImageIO::New(), itk::MetaImageIO::New(), itk::NiftiImageIO::New(), itk::GDCMImageIO::New();
+    return true;
+  }();
+}
+
 itk::ImageIOBase::Pointer MakeIo(FileFormat format) {
-  itk::Object::SetGlobalWarningDisplay(false);  // ITK's warnings quote paths and header text
+  PrepareItk();
   switch (format) {
     case FileFormat::kNrrd:
       return itk::NrrdImageIO::New().GetPointer();
@@ -266,7 +276,7 @@ ItkLayers ReadItkLayers(const std::filesystem::path& nrrd, bool with_values) {
 
 ItkPlanes ReadDicomPlanes(const std::filesystem::path& file, bool with_values, const char* undecoded) {
   const auto read = [&] {
-    itk::Object::SetGlobalWarningDisplay(false);  // its words are for programmers
+    PrepareItk();
     const itk::GDCMImageIO::Pointer io = itk::GDCMImageIO::New();
     io->SetFileName(file.string());
     io->ReadImageInformation();

@@ -46,6 +46,7 @@ void AddLimits(CLI::App& command, WorkerArguments& arguments) {
           "--memory-gib", arguments.memory_gib,
           "Memory that running jobs of all processes may declare together (default: most of the machine's)")
       ->check(ZeroOrAbove())
+      ->check(AtMost(1'000'000'000))
       ->type_name("GIB");
   command
       .add_option("--least-free-gib", arguments.least_free_gib,

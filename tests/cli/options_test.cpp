@@ -294,6 +294,7 @@ TEST_F(QueueOptions, WorkersKeepToTheDiskAndMemoryThatTheyAreGiven) {
             (std::pair<std::string, std::string>("queued", "queued")));
   EXPECT_EQ(AfterWorker({"--memory-gib", "0.001"}, first, second, true).second, "queued");
   EXPECT_NE(AfterWorker({"--memory-gib", "64"}, first, second, true).second, "queued");
+  EXPECT_EQ(Run({"worker", "--data", "none", "--memory-gib", "1e30"}).code, 2) << "no number of bytes";
 }
 
 TEST_F(QueueOptions, ACheckedBackupFindsOtherBytesOfTheSameSize) {

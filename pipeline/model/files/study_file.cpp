@@ -5,6 +5,7 @@
 #include <set>
 #include <span>
 
+#include "core/farthest_place.h"
 #include "core/joint_values.h"
 #include "core/name.h"
 #include "core/region_presets.h"
@@ -210,6 +211,8 @@ std::map<std::string, std::map<std::string, RigidTransform>> ParseInitialPoses(c
     for (const auto& [bone, matrix] : bones.Members()) {
       RequireBone(study, bone, matrix);
       poses[scan][bone] = matrix.Rigid();
+      if (LiesTooFar({poses[scan][bone].translation_mm}))
+        matrix.Fail("moves the bone by more than a kilometre; it is in mm");
     }
   }
   return poses;

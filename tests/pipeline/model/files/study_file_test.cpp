@@ -215,6 +215,7 @@ TEST_F(StudyFile, EveryComplaintNamesItsField) {
       {"/initial_poses/pose01", json{{"hip", json::array()}}, "initial_poses.pose01.hip names a bone"},
       {"/initial_poses/pose01/tibia", json{1, 2, 3}, "initial_poses.pose01.tibia must be 16 numbers"},
       {"/initial_poses/pose01/tibia/0", 2.0, "initial_poses.pose01.tibia must be 16 numbers"},
+      {"/initial_poses/pose01/tibia/3", 1e9, "initial_poses.pose01.tibia moves the bone by more than a kilo"},
       {"/initial_poses/pose01/tibia/0", "x", "initial_poses.pose01.tibia must be 16 numbers"},
   };
   for (const Case& c : cases) {

@@ -87,10 +87,11 @@ ServiceJson PostBatch(ServiceClient& client, const std::vector<KeyedRequest>& re
   return {};
 }
 
-// What the answer says of one model. Without a batch it was asked for alone.
+// What the answer says of one model. Without a batch it was asked for alone; one of then may have ended.
 ServiceJson ModelOf(const ServiceJson& told) {
   ServiceJson model{{"id", told["id"]}, {"job", told["job"]}, {"state", told["state"]}};
-  if (!told["batch"].is_null()) model["batch"] = told["batch"];
+  for (const char* field : {"batch", "result", "error"})
+    if (told.contains(field) && !told[field].is_null()) model[field] = told[field];
   return model;
 }
 

@@ -26,9 +26,10 @@ struct AskedJob {
 AskedJob AskForJob(ServiceClient& client, const std::string& path, const ServiceJson& body, std::string key);
 
 // Models, one for each of `requests` (what POST /v1/models takes), in their order: {"id", "job", "state",
-// "batch"}, or {"state": "failed", "error"} where the service refuses the request; the others go on without
-// it. Those that were asked for before are as they were made then, each by itself; what is new becomes a
-// batch, and what is asked for anew, because its job of then is spent, another.
+// "batch"} and of one that has ended "result" or "error", or {"state": "failed", "error"} where the service
+// refuses the request; the others go on without it. Those that were asked for before are as they were made
+// then, each by itself; what is new becomes a batch, and what is asked for anew, because its job of then is
+// spent, another.
 struct AskedModels {
   std::vector<ServiceJson> models;
   std::string batch;         // the last that was made, else their newest; empty: the service refused them all
@@ -50,6 +51,7 @@ ServiceJson ProblemOf(const std::string& detail);  // of a study that was not su
 std::string ReasonOf(const ServiceJson& ended_job);
 // What the job says of its study in its result.
 std::vector<std::string> WarningsOf(const ServiceJson& ended_job);
+std::string CountedWarnings(size_t warnings);                                    // "3 warnings"; empty: none
 void TellWarnings(const ServiceJson& ended_job, const std::string& about = {});  // before each
 
 }  // namespace kvx

@@ -136,6 +136,26 @@ TEST_F(SubmitBesideOthers, AJobThatIsGoneDoesNotHideTheOthers) {
   EXPECT_EQ(studies[1]["state"], "succeeded");
 }
 
+TEST_F(SubmitBesideOthers, AModelOfThenIsToldWithWhatItsBuildSaid) {
+  service.post_batch = [](const Request&, Response& r) {
+    json batch = ScriptedService::BatchOf(2, "succeeded");
+    for (json& model : batch["models"]) {
+      model["earlier"] = true;
+      model["result"] = {{"digest", "of " + model["id"].get<std::string>()},
+                         {"warnings", {"a bone is doubtful"}}};
+    }
+    ScriptedService::Say(r, 202, batch);
+  };
+  service.Listen();
+  const Ended ended = Run(Words({"--wait"}));
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  const json studies = StudiesOf(ended);
+  EXPECT_EQ(studies[0].value("/result/digest"_json_pointer, ""), "of mdl_1");
+  EXPECT_EQ(studies[1].value("/result/digest"_json_pointer, ""), "of mdl_2");
+  EXPECT_THAT(ended.err, HasSubstr("warning: first: a bone is doubtful"));
+  EXPECT_THAT(ended.err, HasSubstr("warning: second: a bone is doubtful"));
+}
+
 TEST_F(SubmitBesideOthers, OptionsOfThePapersMethodGoWithItAlone) {
   service.Listen();
   const std::vector<std::string> one{"submit", first, "--server", service.url(), "--quiet"};

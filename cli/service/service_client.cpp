@@ -1,6 +1,8 @@
 // Every POST carries an Idempotency-Key, so one that lost its answer can be sent again.
 #include "cli/service/service_client.h"
 
+#include <netinet/tcp.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -104,6 +106,19 @@ void UseToken(httplib::Client& http, const std::string& url) {
   http.set_bearer_token_auth(token);
 }
 
+// A network that has gone ends no connection: whoever waits asks three times a minute whether the other end
+// is there, and knows after a minute or so that it is not.
+void NoticeADeadNetwork(socket_t connection) {
+  const auto set = [connection](int level, int option, int value) {
+    httplib::set_socket_opt(connection, level, option, value);
+  };
+  set(SOL_SOCKET, SO_KEEPALIVE, 1);
+  set(IPPROTO_TCP, TCP_KEEPIDLE, 20);
+  set(IPPROTO_TCP, TCP_KEEPINTVL, 10);
+  set(IPPROTO_TCP, TCP_KEEPCNT, 3);
+  set(IPPROTO_TCP, TCP_USER_TIMEOUT, 60'000);  // ms, of what was sent and is not acknowledged
+}
+
 }  // namespace
 
 WaitSink TellOnStderr() {
@@ -127,6 +142,7 @@ ServiceClient::ServiceClient(const std::string& url) {
   state_->http.set_read_timeout(600);  // a large upload is read whole before it is answered
   state_->http.set_write_timeout(60);
   state_->http.set_tcp_nodelay(true);
+  state_->http.set_socket_options(NoticeADeadNetwork);
   UseToken(state_->http, url);
 }
 

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
+#include <thread>
 
 #include "tests/support/fixtures.h"
 #include "tests/support/listening_server.h"
@@ -48,6 +50,38 @@ class Scripted {
 TEST(ServiceClient, WaitsOutABusyService) {
   const Scripted service({429, 503, 502, 504});
   EXPECT_EQ(ServiceClient(service.url()).GetPatiently("/v1/jobs/a")["tries"], 5);
+}
+
+// Seconds until the system asks the other end of the connection from this port whether it is there; -1: it
+// does not.
+double SecondsToKeepalive(int port) {
+  char local[8];
+  std::snprintf(local, sizeof local, ":%04X", port);
+  std::ifstream table("/proc/net/tcp");
+  for (std::string line; std::getline(table, line);) {
+    std::istringstream row(line);
+    std::string number, from, to, state, queues, timer;
+    row >> number >> from >> to >> state >> queues >> timer;
+    if (from.ends_with(local) && timer.starts_with("02:"))
+      return std::stoi(timer.substr(3), nullptr, 16) / 100.0;
+  }
+  return -1;
+}
+
+TEST(ServiceClient, NoticesThatTheNetworkHasGone) {
+  double seconds = -1;
+  ListeningServer server;
+  server.http.Get("/v1/jobs", [&](const httplib::Request& request, httplib::Response& response) {
+    for (int i = 0; i < 100 && seconds < 0; ++i) {  // until what it sent is acknowledged
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      seconds = SecondsToKeepalive(request.remote_port);
+    }
+    response.set_content("{}", "application/json");
+  });
+  server.Listen();
+  ServiceClient(server.url()).GetPatiently("/v1/jobs");
+  EXPECT_GT(seconds, 0);
+  EXPECT_LE(seconds, 60);
 }
 
 TEST(ServiceClient, SendsAgainUnderTheSameKey) {

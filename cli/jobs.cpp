@@ -22,9 +22,8 @@ void PrintJob(const ServiceJson& job) {
               job["state"].get_ref<const std::string&>().c_str(), 100 * job["progress"].get<double>(),
               job["stage"].get_ref<const std::string&>().c_str(), model.c_str());
   if (job.contains("error")) std::printf("  %s", job["error"].value("detail", "").c_str());
-  const size_t warnings = WarningsOf(job).size();
-  if (warnings > 0) std::printf("  %zu %s", warnings, warnings == 1 ? "warning" : "warnings");
-  std::printf("\n");
+  const std::string warnings = CountedWarnings(WarningsOf(job).size());
+  std::printf("%s%s\n", warnings.empty() ? "" : "  ", warnings.c_str());
 }
 
 // What a batch says of each of its jobs, as the job itself would.

@@ -39,13 +39,20 @@ ServiceJson OptionsOf(const CLI::App& command, const SubmitArguments& arguments)
   return options;
 }
 
-// `seen` counts studies of this command that are alike: each has a subject of its own.
+using Titles = std::vector<std::string>;
+
+// `seen`: by their key, the studies of this command that are alike. Each has a subject of its own.
 ServiceJson RequestOf(const Submission& one, const SubmitArguments& arguments,
-                      std::map<std::string, int>& seen, ServiceClient& client, const UploadProgress& show) {
+                      std::map<std::string, Titles>& seen, ServiceClient& client, const UploadProgress& show,
+                      const UploadWarning& warn) {
   return FromFile(one.study, [&](const std::filesystem::path& study) {
     std::string key = arguments.again ? NewId("key") : KeyOfStudy(study, show);
-    key += "-" + std::to_string(++seen[key]);
-    ServiceJson request = SendStudy(study, key, client, show);
+    Titles& alike = seen[key];
+    if (!alike.empty())
+      warn("has the same scans and bones as " + alike[0] + "; each gets a model of its own");
+    alike.push_back(one.title);
+    key += "-" + std::to_string(alike.size());
+    ServiceJson request = SendStudy(study, key, client, show, warn);
     if (!arguments.options.empty()) request["options"] = arguments.options;
     if (arguments.priority != 0) request["priority"] = arguments.priority;
     return request;
@@ -67,15 +74,17 @@ void SendOne(Submission& one, const Request& request) try {
 // nothing.
 std::exception_ptr SendAll(std::vector<Submission>& submissions, const SubmitArguments& arguments,
                            ServiceClient& client, StudyLines& lines) {
-  std::map<std::string, int> seen;
+  std::map<std::string, Titles> seen;
   std::exception_ptr broke;
-  for (Submission& one : submissions) one.outcome["study"] = one.study.string();
   for (size_t i = 0; i < submissions.size(); ++i) {
     Submission& one = submissions[i];
+    const auto show = [&lines, i](const std::string& what, double f) { lines.Show(i, what, f); };
+    const auto warn = [&](const std::string& sentence) {
+      lines.Above([&] { Warn((submissions.size() == 1 ? "" : one.title + ": ") + sentence); });
+    };
     const auto request = [&] {
       if (broke) std::rethrow_exception(broke);
-      return RequestOf(one, arguments, seen, client,
-                       [&](const std::string& what, double f) { lines.Show(i, what, f); });
+      return RequestOf(one, arguments, seen, client, show, warn);
     };
     client.OnWait([&lines, i](const std::string& reason) { lines.Show(i, "waiting: " + reason); });
     if (submissions.size() == 1) return one.request = request(), nullptr;
@@ -166,9 +175,12 @@ std::string TaleOf(const ServiceJson& job) {
   if (what == "running") what = job["stage"];
   if (what == "queued" && job.contains("queue_position") && job["queue_position"].is_number())
     what += ", number " + job["queue_position"].dump() + " in line";
-  if (job.contains("seconds_left") && job["seconds_left"].is_number())
-    what += ", about " + std::to_string(int(job["seconds_left"].get<double>() + 1)) + " s left";
   return what;
+}
+
+std::string LeftOf(const ServiceJson& job) {
+  if (!job.contains("seconds_left") || !job["seconds_left"].is_number()) return "";
+  return ", about " + std::to_string(int(job["seconds_left"].get<double>() + 1)) + " s left";
 }
 
 void Tell(Submission& one, const ServiceJson& job) {
@@ -189,7 +201,10 @@ bool Look(std::vector<Submission>& submissions, ServiceClient& client, StudyLine
     const ServiceJson job = LookAtJob(outcome["job"], in_batches, client);
     Tell(submissions[i], job);
     const bool ended = Ended(outcome["state"]);
-    lines.Show(i, job.is_null() ? "gone" : TaleOf(job), ended ? 1.0 : job["progress"].get<double>());
+    if (job.is_null())
+      lines.Show(i, "gone", 1.0);
+    else
+      lines.Show(i, TaleOf(job), ended ? 1.0 : job["progress"].get<double>(), LeftOf(job));
     going_on |= !ended;
   }
   return going_on;
@@ -231,11 +246,8 @@ void Run(const SubmitArguments& arguments, const CommandContext& context) {
   CatchInterrupts();
   ServiceClient client(arguments.server);
   StudyLines lines(context.quiet);
-  std::vector<Submission> submissions;
-  for (const std::filesystem::path& study : arguments.studies) {
-    submissions.push_back({study, {}, {}});
-    lines.Add(TitleOf(study));
-  }
+  std::vector<Submission> submissions = SubmissionsOf(arguments.studies);
+  for (const Submission& one : submissions) lines.Add(one.title);
   std::exception_ptr broke = SendAll(submissions, arguments, client, lines);
   TellWaits(submissions, client, lines);
   const Asked asked = AskOrTell(submissions, arguments, client);

@@ -183,6 +183,11 @@ std::vector<std::string> WarningsOf(const ServiceJson& job) {
   return job.value("/result/warnings"_json_pointer, std::vector<std::string>());
 }
 
+std::string CountedWarnings(size_t warnings) {
+  if (warnings == 0) return "";
+  return std::to_string(warnings) + (warnings == 1 ? " warning" : " warnings");
+}
+
 void TellWarnings(const ServiceJson& job, const std::string& about) {
   for (const std::string& warning : WarningsOf(job)) Warn(about + warning);
 }

@@ -2,6 +2,7 @@
 // printed when something changes.
 #pragma once
 #include <cstdio>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -11,14 +12,18 @@ class StudyLines {
  public:
   StudyLines(bool quiet, std::FILE* out = stderr);
   void Add(const std::string& study);
-  void Show(size_t index, const std::string& what, double fraction);  // of the study, 0..1
+  // Of the study; `fraction` 0..1. `left`, how long it will take, is told with the rest, and is no change by
+  // itself.
+  void Show(size_t index, const std::string& what, double fraction, const std::string& left = {});
+  // What `print` writes stays above the lines.
+  void Above(const std::function<void()>& print);
   size_t size() const { return lines_.size(); }
   // As far as it was.
   void Show(size_t index, const std::string& what) { Show(index, what, lines_.at(index).fraction); }
 
  private:
   struct Line {
-    std::string study, what;
+    std::string study, what, left;
     double fraction = 0;
     bool drawn = false;
   };

@@ -13,7 +13,6 @@
 #include "cli/options/named_files.h"
 #include "cli/service/asked_jobs.h"
 #include "cli/service/patience.h"
-#include "cli/service/submission.h"
 #include "cli/terminal/interrupt.h"
 #include "core/digest.h"
 #include "core/region_presets.h"
@@ -158,12 +157,13 @@ std::string ThresholdPath(const std::string& subject, const Study& study) {
 }
 
 // The model can be asked for only when the template's bones are there. Returns the label map's id.
-std::string SegmentedBy(const std::string& job_id, ServiceClient& client, const UploadProgress& show) {
+std::string SegmentedBy(const std::string& job_id, ServiceClient& client, const UploadProgress& show,
+                        const UploadWarning& warn) {
   GrowingPause pause;
   while (true) {
     const ServiceJson job = client.GetPatiently("/v1/jobs/" + job_id);
     if (job["state"] == "succeeded") {
-      TellWarnings(job);
+      for (const std::string& warning : WarningsOf(job)) warn(warning);
       return job["result"]["bones"];
     }
     if (Ended(job["state"])) throw InputError("the bones could not be segmented: " + ReasonOf(job));
@@ -175,8 +175,9 @@ std::string SegmentedBy(const std::string& job_id, ServiceClient& client, const 
 // Sends the parts of one study, counting them.
 class Sender {
  public:
-  Sender(const Study& study, Recipient to, ServiceClient& client, const UploadProgress& show)
-      : study_(study), to_(std::move(to)), client_(client), show_(show) {}
+  Sender(const Study& study, Recipient to, ServiceClient& client, const UploadProgress& show,
+         const UploadWarning& warn)
+      : study_(study), to_(std::move(to)), client_(client), show_(show), warn_(warn) {}
 
   void SendScans() {
     for (const StudyScan& scan : study_.scans) {
@@ -193,11 +194,11 @@ class Sender {
       return Upload("bones", {.bones = true, .name = study_.template_scan}, LabelMapFile())["id"];
     if (study_.bone_seeds.empty()) {
       const std::string path = ThresholdPath(to_.subject, study_);
-      return SegmentedBy(AskForJob(client_, path, {}, to_.key).answer["job"], client_, show_);
+      return SegmentedBy(AskForJob(client_, path, {}, to_.key).answer["job"], client_, show_, warn_);
     }
     const ServiceJson job =
         Upload("strokes", {.bones = true, .strokes = true, .name = study_.template_scan}, study_.bone_seeds);
-    return SegmentedBy(job["id"], client_, show_);
+    return SegmentedBy(job["id"], client_, show_, warn_);
   }
 
  private:
@@ -213,7 +214,7 @@ class Sender {
     std::vector<std::pair<std::string, size_t>> shared;
     for (const StudyBone& bone : study_.bones)
       shared.emplace_back(bone.name, given.shared_voxels[bone.label]);
-    for (const std::string& warning : SharedVoxelWarnings(shared)) Warn(warning);
+    for (const std::string& warning : SharedVoxelWarnings(shared)) warn_(warning);
     return file;
   }
 
@@ -259,6 +260,7 @@ class Sender {
   const Recipient to_;
   ServiceClient& client_;
   const UploadProgress& show_;
+  const UploadWarning& warn_;
   std::optional<TemporaryFolder> scratch_;
   double part_ = 0;
 };
@@ -298,12 +300,12 @@ std::string KeyOfStudy(const std::filesystem::path& study_file, const UploadProg
 }
 
 ServiceJson SendStudy(const std::filesystem::path& study_file, const std::string& key, ServiceClient& client,
-                      const UploadProgress& show) {
+                      const UploadProgress& show, const UploadWarning& warn) {
   const Study study = SendableStudy(study_file);
   for (const std::string& warning : UnreadFieldWarnings(study.unread_fields))
-    Warn(TitleOf(study_file) + ": " + warning);  // the service gets none of them
+    warn(warning);  // the service gets none of them
   const Recipient to = RecipientOf(study, key, client);
-  Sender sender(study, to, client, show);
+  Sender sender(study, to, client, show, warn);
   sender.SendScans();
   return ModelRequest(study_file, study, to.subject, sender.SendBones());
 }

@@ -10,6 +10,7 @@
 namespace kvx {
 
 using UploadProgress = std::function<void(const std::string& what, double fraction)>;  // of the study, 0..1
+using UploadWarning = std::function<void(const std::string& sentence)>;
 
 // The temporary files that a study is sent as cannot be written.
 class NotPacked : public Unavailable {
@@ -23,6 +24,6 @@ std::string KeyOfStudy(const std::filesystem::path& study_file, const UploadProg
 // that was used before it is the subject of then, with the scans and bones that it has. Throws InputError,
 // Denied or TooLarge naming the scan, and NotPacked.
 ServiceJson SendStudy(const std::filesystem::path& study_file, const std::string& key, ServiceClient& client,
-                      const UploadProgress& show);
+                      const UploadProgress& show, const UploadWarning& warn);
 
 }  // namespace kvx

@@ -2,9 +2,18 @@
 #include "cli/service/submission.h"
 
 #include <cstdio>
+#include <map>
+
+#include "cli/terminal/terminal_line.h"
 
 namespace kvx {
 namespace {
+
+// Of one that has ended.
+std::string WhatIsToSay(const ServiceJson& outcome) {
+  if (EndedBadly(outcome["state"])) return ReasonOf(outcome);
+  return CountedWarnings(WarningsOf(outcome).size());
+}
 
 void PrintTable(const std::vector<Submission>& submissions) {
   for (const std::string& batch : BatchesOf(submissions)) std::printf("batch %s\n", batch.c_str());
@@ -16,8 +25,9 @@ void PrintTable(const std::vector<Submission>& submissions) {
                   o["job"].get_ref<const std::string&>().c_str(), state.c_str());
       continue;
     }
-    std::printf("%-28s %-9s %s %s\n", TitleOf(one.study).c_str(), state.c_str(),
-                o.value("id", std::string("-")).c_str(), EndedBadly(o["state"]) ? ReasonOf(o).c_str() : "");
+    const std::string title = FilledTo(std::max<size_t>(28, WidthOf(one.title)), one.title);
+    std::printf("%s %-9s %s  %s\n", title.c_str(), state.c_str(), o.value("id", std::string("-")).c_str(),
+                WhatIsToSay(o).c_str());
   }
 }
 
@@ -27,14 +37,43 @@ void PrintJson(const ServiceJson& document) {
 
 void TellAllWarnings(const std::vector<Submission>& submissions) {
   for (const Submission& one : submissions)
-    TellWarnings(one.outcome, submissions.size() == 1 ? "" : TitleOf(one.study) + ": ");
+    TellWarnings(one.outcome, submissions.size() == 1 ? "" : one.title + ": ");
+}
+
+std::filesystem::path Whole(const std::filesystem::path& study) {
+  return std::filesystem::absolute(study).lexically_normal();
+}
+
+std::string TitleOf(const std::filesystem::path& study, size_t parts) {
+  std::filesystem::path rest = Whole(study);
+  if (rest.filename() == "study.json" && rest.parent_path().has_filename()) rest = rest.parent_path();
+  std::filesystem::path title = rest.filename();
+  while (--parts > 0 && (rest = rest.parent_path()).has_filename()) title = rest.filename() / title;
+  return title.string();
+}
+
+// Gives those that share theirs with another study a longer one. False: there are none, or no longer ones.
+bool TellApart(std::vector<Submission>& submissions, size_t parts) {
+  std::map<std::string, std::set<std::filesystem::path>> called;
+  for (const Submission& one : submissions) called[one.title].insert(Whole(one.study));
+  bool longer = false;
+  for (Submission& one : submissions) {
+    if (called[one.title].size() == 1) continue;
+    const std::string title = TitleOf(one.study, parts);
+    longer |= title != one.title;
+    one.title = title;
+  }
+  return longer;
 }
 
 }  // namespace
 
-std::string TitleOf(const std::filesystem::path& study) {
-  const std::string folder = std::filesystem::absolute(study).parent_path().filename().string();
-  return study.filename() == "study.json" && !folder.empty() ? folder : study.filename().string();
+std::vector<Submission> SubmissionsOf(const std::vector<std::filesystem::path>& studies) {
+  std::vector<Submission> submissions;
+  for (const std::filesystem::path& study : studies)
+    submissions.push_back({study, TitleOf(study, 1), {}, {{"study", study.string()}}});
+  for (size_t parts = 2; TellApart(submissions, parts);) ++parts;
+  return submissions;
 }
 
 void Refuse(Submission& one, const std::string& why) {

@@ -13,10 +13,13 @@ namespace kvx {
 // A study that fails does not stop the others.
 struct Submission {
   std::filesystem::path study;
+  std::string title;             // short, and no other study's
   ServiceJson request, outcome;  // outcome: {"study", "id", "job", "state", "batch"?, "result" or "error"}
 };
 
-std::string TitleOf(const std::filesystem::path& study);
+// In their order. A title is the study's folder or, of a file with a name of its own, that name, with as much
+// of the path before it as tells it from the others.
+std::vector<Submission> SubmissionsOf(const std::vector<std::filesystem::path>& studies);
 void Refuse(Submission& one, const std::string& why);  // it has no model
 std::set<std::string> BatchesOf(const std::vector<Submission>& submissions);
 

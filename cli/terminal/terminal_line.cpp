@@ -40,6 +40,8 @@ size_t ColumnsOf(std::FILE* terminal) {
   return size.ws_col - size_t(1);
 }
 
+size_t WidthOf(std::string_view text) { return Within(std::numeric_limits<size_t>::max(), text).columns; }
+
 std::string CutTo(size_t columns, std::string_view text) {
   return std::string(text.substr(0, Within(columns, text).bytes));
 }

@@ -10,7 +10,9 @@ namespace kvx {
 // wide it is has room.
 size_t ColumnsOf(std::FILE* terminal);
 
-// Its beginning, in whole letters. One of more than two bytes counts as two columns, which it may be wide.
+// In columns. A letter of more than two bytes counts as two, which it may be wide.
+size_t WidthOf(std::string_view text);
+// Its beginning, in whole letters.
 std::string CutTo(size_t columns, std::string_view text);
 std::string FilledTo(size_t columns, std::string_view text);  // cut, or with blanks behind it
 

@@ -62,6 +62,45 @@ TEST(StudyLines, AreCutToTheTerminalsWidth) {
   EXPECT_GT(Widest(StudiesOn(24, 0, reason)), 200u) << "it does not say how wide it is";
 }
 
+// A row that is printed among them would be drawn over, and shift them.
+TEST(StudyLines, LeaveWhatIsPrintedAboveThem) {
+  const std::string sent = SentTo({24, 80}, [](std::FILE* out) {
+    StudyLines lines(false, out);
+    for (const char* study : {"a", "b"}) lines.Add(study);
+    lines.Show(0, "reading", 0);
+    lines.Above([out] { std::fprintf(out, "look here\n"); });
+    lines.Show(1, "reading", 0);
+  });
+  EXPECT_THAT(sent, HasSubstr("\x1b[2A\r\x1b[Jlook here\r\n\r\x1b[Ka "));
+  EXPECT_THAT(sent.substr(sent.find("look here")), HasSubstr("\x1b[2A\r\x1b[Ka "));
+}
+
+// Minutes of a build would be hundreds of rows of a log.
+TEST(StudyLines, ArePrintedOnceWhileOnlyTheTimeLeftChanges) {
+  const auto sent = [](unsigned short rows) {
+    return SentTo({rows, 80}, [](std::FILE* out) {
+      StudyLines lines(false, out);
+      for (const char* study : {"a", "b"}) lines.Add(study);
+      for (const char* left : {", 9 s left", ", 8 s left", ", 7 s left"})
+        lines.Show(0, "register", 0.5, left);
+    });
+  };
+  EXPECT_EQ(sent(2), "a   50 %  register, 9 s left\r\n");
+  EXPECT_THAT(sent(24), HasSubstr("7 s left")) << "drawn again where it can be";
+}
+
+TEST(StudyLines, KeepLongTitlesWhole) {
+  const std::string north = "institute/north/patient-0001/right",
+                    south = "institute/south/patient-0001/right";
+  const std::string sent = SentTo({24, 80}, [&](std::FILE* out) {
+    StudyLines lines(false, out);
+    for (const std::string& study : {north, south}) lines.Add(study);
+    lines.Show(0, "reading", 0);
+  });
+  EXPECT_THAT(sent, HasSubstr(north + "   0 %  reading"));
+  EXPECT_THAT(sent, HasSubstr(south + "   0 %  waiting"));
+}
+
 TEST(ProgressBar, IsCutToTheTerminalsWidth) {
   const std::string sent = SentTo({24, 80}, [](std::FILE* out) {
     ProgressBar(ProgressBar::Form::kBar, out).Show("waiting: " + std::string(200, 'x'), 0.5);

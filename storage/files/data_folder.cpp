@@ -6,6 +6,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -193,6 +194,14 @@ uintmax_t DataFolder::FreeBytes() const {
   std::error_code error;
   const auto space = std::filesystem::space(root_, error);
   return error ? 0 : space.available;
+}
+
+// A file system may hold only so many (inodes), whatever their size. One that has no such number says 0 of
+// all.
+bool DataFolder::HasRoomForFiles() const {
+  constexpr fsfilcnt_t kOfSomeJobs = 1024;
+  struct statvfs disk {};
+  return ::statvfs(root_.c_str(), &disk) != 0 || disk.f_files == 0 || disk.f_favail >= kOfSomeJobs;
 }
 
 }  // namespace kvx

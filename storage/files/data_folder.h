@@ -41,8 +41,9 @@ class DataFolder {
   std::filesystem::path work() const { return root_ / "work"; }  // emptied by a service that starts alone
   std::filesystem::path Model(const std::string& id) const { return root_ / "models" / id; }
   uintmax_t FreeBytes() const;
+  // For so many bytes beyond the reserve, and for files.
   bool HasRoom(uintmax_t reserve_bytes, int64_t more_bytes) const {
-    return int64_t(FreeBytes()) - int64_t(reserve_bytes) >= more_bytes;
+    return HasRoomForFiles() && int64_t(FreeBytes()) - int64_t(reserve_bytes) >= more_bytes;
   }
   // No worker of another process was there when this service started:
   // whatever looks like their work is a dead one's.
@@ -50,6 +51,7 @@ class DataFolder {
   void LetWorkersIn();  // once the service has dealt with what dead ones left
 
  private:
+  bool HasRoomForFiles() const;
   void LockForService();
   bool TryAlone();
   void HoldTogether();

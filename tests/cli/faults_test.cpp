@@ -61,6 +61,8 @@ TEST_F(Faults, AJobThatKillsThreeWorkersHasFailed) { Script("killer_job.py"); }
 
 TEST_F(Faults, ADiskThatFillsUp) { Script("disk_full.py", "--rounds " + Times(3, 40)); }
 
+TEST_F(Faults, ADiskThatHoldsNoMoreFiles) { Script("no_files_left.py"); }
+
 TEST_F(Faults, ADiskOfKernelsThatFillsUp) { Script("kernels_disk_full.py"); }
 
 TEST_F(Faults, DamagedUploads) {

@@ -1,10 +1,12 @@
 // kinevox submit: studies go to the service, which builds their models.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
 
 #include "cli/options/named_files.h"
 #include "cli/options/paper_options.h"
@@ -191,28 +193,55 @@ void Tell(Submission& one, const ServiceJson& job) {
   }
 }
 
-// False once all have ended.
-bool Look(std::vector<Submission>& submissions, ServiceClient& client, StudyLines& lines) {
-  bool going_on = false;
+struct GoingOn {
+  bool any = false, running = false;
+};
+
+// `held`: why jobs are not begun; told of the first in line.
+GoingOn Look(std::vector<Submission>& submissions, ServiceClient& client, StudyLines& lines,
+             std::string held = "") {
+  GoingOn going_on;
   const std::map<std::string, ServiceJson> in_batches = LookAtBatches(submissions, client);
   for (size_t i = 0; i < submissions.size(); ++i) {
     const ServiceJson& outcome = submissions[i].outcome;
     if (Ended(outcome["state"])) continue;
     const ServiceJson job = LookAtJob(outcome["job"], in_batches, client);
     Tell(submissions[i], job);
-    const bool ended = Ended(outcome["state"]);
+    const bool ended = Ended(outcome["state"]), in_line = outcome["state"] == "queued";
+    const std::string why = in_line && !held.empty() ? ": " + std::exchange(held, "") : "";
     if (job.is_null())
       lines.Show(i, "gone", 1.0);
     else
-      lines.Show(i, TaleOf(job), ended ? 1.0 : job["progress"].get<double>(), LeftOf(job));
-    going_on |= !ended;
+      lines.Show(i, TaleOf(job) + why, ended ? 1.0 : job["progress"].get<double>(), LeftOf(job));
+    going_on.any |= !ended;
+    going_on.running |= !ended && !in_line;
   }
   return going_on;
 }
 
+// While no job runs: why none is begun. Asked for every ten seconds.
+class Reason {
+ public:
+  std::string For(const GoingOn& now, ServiceClient& client) {
+    if (now.running || !now.any) return "";
+    const auto time = std::chrono::steady_clock::now();
+    if (time < next_) return told_;
+    next_ = time + std::chrono::seconds(10);
+    return told_ = client.WhyNotReady();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point next_;
+  std::string told_;
+};
+
 void Wait(std::vector<Submission>& submissions, ServiceClient& client, StudyLines& lines) {
   GrowingPause pause;
-  while (Look(submissions, client, lines)) pause.Wait();
+  Reason reason;
+  for (GoingOn now = Look(submissions, client, lines); now.any;) {
+    pause.Wait();
+    now = Look(submissions, client, lines, reason.For(now, client));
+  }
 }
 
 // What the service goes on with, and how to have a hand in it.

@@ -162,6 +162,11 @@ ServiceJson ServiceClient::GetPatiently(const std::string& path) {
   return Checked(state_->SendPatiently([&] { return state_->http.Get(path); }));
 }
 
+std::string ServiceClient::WhyNotReady() {
+  const httplib::Result result = UntilInterrupted(state_->http, [&] { return state_->http.Get("/readyz"); });
+  return result && result->status == 503 ? ReasonToWait(result) : "";
+}
+
 ServiceJson ServiceClient::Delete(const std::string& path) {
   int tries = 0;
   const httplib::Result result = state_->SendPatiently([&] { return ++tries, state_->http.Delete(path); });

@@ -62,6 +62,8 @@ class ServiceClient {
   // answered before does not. So do Post and Upload. A 429 whose Retry-After is above a minute (a quota of
   // the day) is Refused at once.
   ServiceJson GetPatiently(const std::string& path);
+  // Why the service begins no job now, by its own account (/readyz); empty: it would, or says nothing.
+  std::string WhyNotReady();
   // Of a job or batch; asks again as GetPatiently does. One whose answer was lost counts when it has
   // cancelled.
   ServiceJson Delete(const std::string& path);

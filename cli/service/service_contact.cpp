@@ -40,12 +40,6 @@ std::string InWords(uint64_t seconds) {
   return minutes <= 120 ? std::to_string(minutes) + " min" : std::to_string((minutes + 59) / 60) + " h";
 }
 
-std::string ReasonToWait(const httplib::Result& result) {
-  if (!result) return "no kinevox service answers";
-  const std::string detail = DetailIn(result->body);
-  return detail.empty() ? StatusOnly(result->status) : detail.substr(0, detail.find(';'));
-}
-
 bool MayAnswerYet(httplib::Error error, bool answered_before) {
   if (error == httplib::Error::Connection) return answered_before;
   return error != httplib::Error::SSLServerVerification &&
@@ -54,6 +48,12 @@ bool MayAnswerYet(httplib::Error error, bool answered_before) {
 }
 
 }  // namespace
+
+std::string ReasonToWait(const httplib::Result& result) {
+  if (!result) return "no kinevox service answers";
+  const std::string detail = DetailIn(result->body);
+  return detail.empty() ? StatusOnly(result->status) : detail.substr(0, detail.find(';'));
+}
 
 void ThrowNoAnswer(httplib::Error error) {
   switch (error) {

@@ -22,6 +22,7 @@ std::optional<std::chrono::seconds> BusyFor(const httplib::Response& response);
 [[noreturn]] void ThrowNoAnswer(httplib::Error error);
 [[noreturn]] void ThrowGivenUp(const httplib::Result& result);
 ServiceJson Checked(const httplib::Result& result);
+std::string ReasonToWait(const httplib::Result& result);
 
 // What a client knows of its service, and whom it tells that it waits.
 struct Contact {

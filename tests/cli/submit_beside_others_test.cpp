@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <sys/wait.h>
 
+#include <atomic>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -134,6 +135,34 @@ TEST_F(SubmitBesideOthers, AJobThatIsGoneDoesNotHideTheOthers) {
   EXPECT_EQ(studies[0]["state"], "failed");
   EXPECT_THAT(Why(studies[0]), HasSubstr("gone from the service"));
   EXPECT_EQ(studies[1]["state"], "succeeded");
+}
+
+TEST_F(SubmitBesideOthers, WhyNoJobIsBegunIsTold) {
+  std::atomic<int> looks = 0;
+  service.get_job = [&](const Request& q, Response& r) {
+    const bool ended = ++looks > 6;
+    ScriptedService::Say(
+        r, 200,
+        {{"id", q.matches[1].str()}, {"state", ended ? "succeeded" : "queued"}, {"progress", ended ? 1 : 0}});
+  };
+  service.get_ready = [](const Request&, Response& r) {
+    ScriptedService::Say(r, 503, {{"detail", "the disk is nearly full; make room"}});
+  };
+  service.Listen();
+  const Ended ended = Run({"submit", first, second, "--server", service.url(), "--wait"});
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  EXPECT_THAT(ended.err, HasSubstr("first    0 %  queued: the disk is nearly full\n"));
+  EXPECT_THAT(ended.err, Not(HasSubstr("second    0 %  queued: ")));
+}
+
+TEST_F(SubmitBesideOthers, StudiesThatAreAlikeAreToldSo) {
+  service.Listen();
+  const std::string copy = Study("copy");
+  std::filesystem::copy_file(first, copy, std::filesystem::copy_options::overwrite_existing);
+  const Ended ended = Run({"submit", first, second, copy, "--server", service.url(), "--quiet"});
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  EXPECT_EQ(ended.err,
+            "kinevox: warning: copy: has the same scans and bones as first; each gets a model of its own\n");
 }
 
 TEST_F(SubmitBesideOthers, AModelOfThenIsToldWithWhatItsBuildSaid) {

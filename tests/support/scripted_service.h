@@ -20,6 +20,7 @@ class ScriptedService {
       const size_t count = nlohmann::json::parse(q.body)["models"].size();
       Say(r, 202, BatchOf(count, "queued"));
     };
+    get_ready = [](const httplib::Request&, httplib::Response& r) { Say(r, 200, {{"status", "ready"}}); };
     get_batch = [](const httplib::Request&, httplib::Response& r) { Say(r, 404, {{"detail", "no batch"}}); };
     get_job = [](const httplib::Request& q, httplib::Response& r) {
       Say(r, 200, {{"id", q.matches[1].str()}, {"state", "succeeded"}, {"created", "2026"}});
@@ -66,11 +67,12 @@ class ScriptedService {
     http.Post("/v1/batches", post_batch);
     http.Get("/v1/batches/.*", get_batch);
     http.Get("/v1/jobs/(.*)", get_job);
+    http.Get("/readyz", get_ready);
     server_.Listen();
   }
   std::string url() const { return server_.url(); }
 
-  Handler put_scan, post_batch, get_batch, get_job;
+  Handler put_scan, post_batch, get_batch, get_job, get_ready;
   nlohmann::json asked;  // the last POST /v1/models
 
  private:

@@ -99,6 +99,21 @@ TEST(Database, ListsThatAreSearchedUseAnIndex) {
   }
 }
 
+// Of two workers' looks each second, whatever the jobs are that have ended.
+TEST(Database, TheNextJobIsFoundWithoutThoseThatHaveEnded) {
+  const ScratchFolder scratch;
+  Database db(scratch.path() / "a.db");
+  for (const char* search : {"claim_next_job", "jobs_before"}) {
+    std::string plan;
+    db.Read([&](SQLite::Database& d) {
+      SQLite::Statement step(d, "EXPLAIN QUERY PLAN " + sqlite::Sql(search));
+      while (step.executeStep()) plan += sqlite::Text(step, 3) + "\n";
+    });
+    EXPECT_NE(plan.find("SEARCH begun USING COVERING INDEX job_begun"), plan.npos) << search << ":\n" << plan;
+    EXPECT_EQ(plan.find("SCAN job\n"), plan.npos) << search << ":\n" << plan;
+  }
+}
+
 TEST(Database, AThrowRollsBackEverythingJoined) {
   const ScratchFolder scratch;
   Database db(scratch.path() / "a.db");

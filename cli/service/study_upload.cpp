@@ -190,8 +190,11 @@ class Sender {
   std::string SendBones() {
     const std::string already = BonesAlready(to_, study_.template_scan, client_);
     if (!already.empty()) return already;
-    if (!study_.bone_labels.empty())
-      return Upload("bones", {.bones = true, .name = study_.template_scan}, LabelMapFile())["id"];
+    if (!study_.bone_labels.empty()) {
+      Upload("bones", {.bones = true, .name = study_.template_scan}, LabelMapFile());
+      // The same command elsewhere may have sent its own first, and asks for the model of that.
+      return BonesAlready(to_, study_.template_scan, client_);
+    }
     if (study_.bone_seeds.empty()) {
       const std::string path = ThresholdPath(to_.subject, study_);
       return SegmentedBy(AskForJob(client_, path, {}, to_.key).answer["job"], client_, show_, warn_);

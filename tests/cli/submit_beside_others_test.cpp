@@ -137,6 +137,19 @@ TEST_F(SubmitBesideOthers, AJobThatIsGoneDoesNotHideTheOthers) {
   EXPECT_EQ(studies[1]["state"], "succeeded");
 }
 
+// Their label maps cross each other on the way; the service would build a model of each.
+TEST_F(SubmitBesideOthers, TheSameCommandTwiceAtOnceAsksForOneModel) {
+  std::atomic<int> looks = 0;
+  service.get_bones = [&](const Request&, Response& r) {
+    if (++looks == 1) return ScriptedService::SayBones(r, {});
+    ScriptedService::SayBones(r, {"bon_sent", "bon_of_the_other"});
+  };
+  service.Listen();
+  const Ended ended = Run({"submit", first, "--server", service.url(), "--quiet"});
+  EXPECT_EQ(ended.code, 0) << ended.err;
+  EXPECT_EQ(service.asked["bones"]["id"], "bon_of_the_other");
+}
+
 TEST_F(SubmitBesideOthers, WhyNoJobIsBegunIsTold) {
   std::atomic<int> looks = 0;
   service.get_job = [&](const Request& q, Response& r) {

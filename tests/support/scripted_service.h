@@ -15,6 +15,7 @@ class ScriptedService {
   using Handler = std::function<void(const httplib::Request&, httplib::Response&)>;
 
   ScriptedService() {
+    get_bones = [](const httplib::Request&, httplib::Response& r) { SayBones(r, {"bon_1"}); };
     put_scan = [](const httplib::Request&, httplib::Response& r) { Say(r, 201, {{"id", "scn_1"}}); };
     post_batch = [](const httplib::Request& q, httplib::Response& r) {
       const size_t count = nlohmann::json::parse(q.body)["models"].size();
@@ -44,6 +45,12 @@ class ScriptedService {
     }
     return {{"id", "bat_1"}, {"models", models}};
   }
+  // The list of a subject's label maps: newest first.
+  static void SayBones(httplib::Response& r, const std::vector<std::string>& ids) {
+    nlohmann::json items = nlohmann::json::array();
+    for (const std::string& id : ids) items.push_back({{"id", id}, {"template", "pose00"}});
+    Say(r, 200, {{"items", items}, {"next", nullptr}});
+  }
   void Listen() {
     httplib::Server& http = server_.http;
     http.Post("/v1/subjects", [this](const httplib::Request&, httplib::Response& r) {
@@ -52,9 +59,9 @@ class ScriptedService {
     http.Get("/v1/subjects/[^/]+/scans", [](const httplib::Request&, httplib::Response& r) {
       Say(r, 200, {{"items", nlohmann::json::array()}, {"next", nullptr}});
     });
-    http.Get("/v1/subjects/[^/]+/bones", [](const httplib::Request&, httplib::Response& r) {
-      const nlohmann::json bones = {{"id", "bon_1"}, {"template", "pose00"}};
-      Say(r, 200, {{"items", {bones}}, {"next", nullptr}});
+    http.Get("/v1/subjects/[^/]+/bones", get_bones);
+    http.Post("/v1/subjects/[^/]+/bones", [](const httplib::Request&, httplib::Response& r) {
+      Say(r, 201, {{"id", "bon_sent"}, {"template", "pose00"}});
     });
     http.Put("/v1/subjects/[^/]+/scans/.*", put_scan);
     http.Get("/v1/jobs", [](const httplib::Request&, httplib::Response& r) {
@@ -72,7 +79,7 @@ class ScriptedService {
   }
   std::string url() const { return server_.url(); }
 
-  Handler put_scan, post_batch, get_batch, get_job, get_ready;
+  Handler get_bones, put_scan, post_batch, get_batch, get_job, get_ready;
   nlohmann::json asked;  // the last POST /v1/models
 
  private:

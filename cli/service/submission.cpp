@@ -29,6 +29,7 @@ void PrintTable(const std::vector<Submission>& submissions) {
     std::printf("%s %-9s %s  %s\n", title.c_str(), state.c_str(), o.value("id", std::string("-")).c_str(),
                 WhatIsToSay(o).c_str());
   }
+  RequirePrinted();
 }
 
 void PrintJson(const ServiceJson& document) {

@@ -168,6 +168,14 @@ TEST_F(SubmitBesideOthers, WhyNoJobIsBegunIsTold) {
   EXPECT_THAT(ended.err, Not(HasSubstr("second    0 %  queued: ")));
 }
 
+TEST_F(SubmitBesideOthers, ATableThatCannotBeWrittenIsToldBesideStudiesThatFailed) {
+  service.Listen();
+  const std::string words = " submit " + first + " " + At("none.json") + " --quiet --server " + service.url();
+  const int status = std::system((KVX_PROGRAM + words + " > /dev/full 2> " + At("err")).c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 4);
+  EXPECT_THAT(Content(At("err")), HasSubstr("cannot be written to stdout"));
+}
+
 TEST_F(SubmitBesideOthers, StudiesThatAreAlikeAreToldSo) {
   service.Listen();
   const std::string copy = Study("copy");

@@ -165,6 +165,8 @@ Json View(const JobRecord& job) {
   json["attempt"] = job.attempt;
   json["cancel_requested"] = job.cancel_requested;
   json["priority"] = job.priority;
+  if (job.subject) json["subject"] = *job.subject;
+  if (job.subject_name) json["subject_name"] = *job.subject_name;
   if (job.batch) json["batch"] = *job.batch;
   json["created"] = IsoTime(job.created_ms);
   json["started"] = TimeOrNull(job.started_ms);

@@ -21,6 +21,8 @@ void PrintJob(const ServiceJson& job) {
   std::printf("%s  %-9s %3.0f %%  %-24s %s", job["id"].get_ref<const std::string&>().c_str(),
               job["state"].get_ref<const std::string&>().c_str(), 100 * job["progress"].get<double>(),
               job["stage"].get_ref<const std::string&>().c_str(), model.c_str());
+  if (job.contains("subject_name"))
+    std::printf("  %s", job["subject_name"].get_ref<const std::string&>().c_str());
   if (job.contains("error")) std::printf("  %s", job["error"].value("detail", "").c_str());
   const std::string warnings = CountedWarnings(WarningsOf(job).size());
   std::printf("%s%s\n", warnings.empty() ? "" : "  ", warnings.c_str());

@@ -47,6 +47,8 @@ JobRecord JobRow(SQLite::Statement& row) {
   job.priority = Integer(row, 15);
   job.work = row.getColumn(16).getDouble();
   job.batch = OptionalText(row, 17);
+  job.subject = OptionalText(row, 18);
+  job.subject_name = OptionalText(row, 19);
   return job;
 }
 

@@ -30,7 +30,7 @@ struct JobRecord {
   std::optional<int64_t> started_ms, finished_ms;
   int64_t priority = 0;
   double work = 0;
-  std::optional<std::string> batch;
+  std::optional<std::string> batch, subject, subject_name;
 
   bool Ended() const { return IsEnd(state); }
 };

@@ -89,6 +89,8 @@ Json WithJobs(const BatchRecord& batch, const std::vector<JobRecord>& jobs) {
               {"state", job.state},
               {"stage", job.stage},
               {"progress", job.progress}};
+    if (job.subject) item["subject"] = *job.subject;
+    if (job.subject_name) item["subject_name"] = *job.subject_name;
     if (job.error) item["error"] = Json::parse(*job.error);
     if (job.result) item["result"] = Json::parse(*job.result);
     json["models"].push_back(item);

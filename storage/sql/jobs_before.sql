@@ -5,5 +5,6 @@ WITH place AS (SELECT seq, project, row_number() OVER (PARTITION BY project ORDE
                 FROM place WHERE of_project = 1),
      line AS (SELECT seq, row_number() OVER (ORDER BY of_project, begun_ms, seq) AS number FROM place JOIN turn USING (project))
 SELECT seq, id, kind, model, state, attempt, max_attempts, cancel_requested, stage, progress, error, result,
-       created_ms, started_ms, finished_ms, priority, work, batch FROM job
+       created_ms, started_ms, finished_ms, priority, work, batch, subject,
+       (SELECT name FROM subject WHERE id = job.subject) FROM job
  WHERE state = 'running' OR seq IN (SELECT seq FROM line WHERE number < (SELECT number FROM line WHERE seq = ?1))

@@ -17,8 +17,8 @@ namespace {
 
 using testing_support::ServiceWorld;
 
-std::string SubjectWithScans(ServiceWorld& w) {
-  const std::string subject = Json::parse(CreateSubject(w.services, R"({"region":"knee"})", "").body)["id"];
+std::string SubjectWithScans(ServiceWorld& w, const char* body = R"({"region":"knee"})") {
+  const std::string subject = Json::parse(CreateSubject(w.services, body, "").body)["id"];
   for (const char* name : {"pose00", "pose01"}) {
     Upload upload = Upload::OfScan(w.services, subject, {{"name", name}, {"filename", "a.nii"}}, "");
     upload.Write(std::string("VOXELS") + name);
@@ -80,6 +80,24 @@ TEST(Batches, AreAcceptedWholeOrNotAtAll) {
   EXPECT_NE(refusal("x"), "");
   EXPECT_FALSE(w.jobs.Claim("w"));
   EXPECT_TRUE(w.catalogue.Batches({}).items.empty());
+}
+
+// Of forty jobs nobody knows the ids.
+TEST(Batches, TellWhoseEachJobIs) {
+  ServiceWorld w;
+  const std::string named = SubjectWithScans(w, R"({"region":"knee","name":"knee-a"})"),
+                    other = SubjectWithScans(w);
+  const Json made =
+      Json::parse(CreateBatch(w.services, Dump(Json{{"models", Models({named, other})}}), "").body);
+  const Json models = Json::parse(GetBatch(w.services, made["id"]))["models"];
+  EXPECT_EQ(models[0]["subject"], named);
+  EXPECT_EQ(models[0]["subject_name"], "knee-a");
+  EXPECT_EQ(models[1]["subject"], other);
+  EXPECT_FALSE(models[1].contains("subject_name"));
+  const Json job = Json::parse(GetJob(w.services, models[0]["job"]));
+  EXPECT_EQ(job["subject"], named);
+  EXPECT_EQ(job["subject_name"], "knee-a");
+  EXPECT_EQ(Json::parse(ListJobs(w.services, {}))["items"][1]["subject_name"], "knee-a");
 }
 
 // Two studies, then the same two and one more.

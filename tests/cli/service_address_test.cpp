@@ -59,14 +59,16 @@ TEST_F(ServiceAddress, ATokenLosesWhatAFileAddsToIt) {
 TEST_F(ServiceAddress, ABatchsJobsAreListedByItsId) {
   ScriptedService service;
   service.get_batch = [](const httplib::Request&, httplib::Response& r) {
-    ScriptedService::Say(r, 200, ScriptedService::BatchOf(2, "running"));
+    nlohmann::json batch = ScriptedService::BatchOf(2, "running");
+    batch["models"][1]["subject_name"] = "knee-b";
+    ScriptedService::Say(r, 200, batch);
   };
   service.Listen();
   const Ended ended = Run({"jobs", "bat_1", "--server", service.url()});
   EXPECT_EQ(ended.code, 0) << ended.err;
   EXPECT_THAT(ended.out, HasSubstr("job_1  running"));
   EXPECT_THAT(ended.out, HasSubstr("job_2  running"));
-  EXPECT_THAT(ended.out, HasSubstr("mdl_2"));
+  EXPECT_THAT(ended.out, HasSubstr("mdl_2  knee-b\n"));
   EXPECT_EQ(RunJson({"jobs", "bat_1", "--server", service.url()})["models"].size(), 2u);
 }
 

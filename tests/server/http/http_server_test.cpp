@@ -67,7 +67,9 @@ TEST(HttpServer, ABodyThatIsTooLargeIsRefusedBeforeItComes) {
   };
   const auto answer = raw.Post(path, size_t(50) << 30, body, "application/octet-stream");
   EXPECT_LT(sent, size_t(8) << 20);
-  if (answer) EXPECT_EQ(answer->status, 413);  // else the connection closed under what was being sent
+  if (answer) {  // else the connection closed under what was being sent
+    EXPECT_EQ(answer->status, 413);
+  }
   sent = 0;
   const auto asked = raw.Post(path, {{"Expect", "100-continue"}}, size_t(50) << 30, body, "x/y");
   ExpectProblem(asked, 413);

@@ -189,9 +189,7 @@ std::vector<JobRecord> JobQueue::OfBatch(const std::string& batch) {
 }
 
 std::vector<JobRecord> JobQueue::BeforeInLine(const JobRecord& queued) {
-  return db_.Read([&](SQLite::Database& db) {
-    return sqlite::All(db, "jobs_before", JobRow, queued.seq);
-  });
+  return db_.Read([&](SQLite::Database& db) { return sqlite::All(db, "jobs_before", JobRow, queued.seq); });
 }
 
 std::vector<StageTime> JobQueue::StagesOf(const std::string& job) {

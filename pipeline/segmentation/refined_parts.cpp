@@ -29,11 +29,11 @@ Mask Borders(const LabelMap& parts) {
   return borders;
 }
 
-// Parts with a number below that of background strokes; so many are no skeleton's.
+// By number, of the parts below the number of background strokes: more are no skeleton's. Depths are from the
+// voxels at a part's border.
 struct PartSizes {
   std::vector<double> mm3 = std::vector<double>(kBackgroundStroke, 0.0);
-  std::vector<float> deepest_mm =
-      std::vector<float>(kBackgroundStroke, 0.0f);  // from the voxels at the border
+  std::vector<float> deepest_mm = std::vector<float>(kBackgroundStroke, 0.0f);
 
   PartSizes(const LabelMap& parts, const Volume& depth_mm) {
     for (size_t v = 0; v < parts.values.size(); ++v) {

@@ -16,8 +16,8 @@ struct NeckParts {
 NeckParts PartAtNecks(const Mask& mask);
 
 // Whether something of this size is as deep as what is filled. Shells and the mesh of spongy bone are far
-// from it (400 and more mm3 over mm cubed), and their depth says nothing about necks. `depth_mm`: from its
-// deepest voxel to its surface.
+// from it (ten times as large), and their depth says nothing about necks. `depth_mm`: from its deepest voxel
+// to its surface.
 bool IsSolid(double mm3, double depth_mm);
 
 }  // namespace kvx

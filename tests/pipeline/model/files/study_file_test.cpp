@@ -80,9 +80,9 @@ TEST_F(StudyFile, FieldsThatNobodyReadsAreNotedInEveryItemOfAList) {
 
 TEST_F(StudyFile, AListOfBonesMayBeACopyOfWhatTheProgramSaysOfThem) {
   json study = Good();
-  study["bones"]["list"][0].update(json::parse(
-      R"({"confidence": 0.9, "looks_like": "tibia", "voxels": 7, "cm3": 0.2, "centre": [1,2,3],)"
-      R"("expected_dice": 0.8})"));
+  study["bones"]["list"][0].update(
+      json::parse(R"({"confidence": 0.9, "looks_like": "tibia", "voxels": 7, "cm3": 0.2, "centre": [1,2,3],)"
+                  R"("expected_dice": 0.8})"));
   study["bones"]["list"][1].update(json::parse(R"({"voxels": 7, "centroid": [1,2,3], "obb": {}})"));
   EXPECT_THAT(Parse(study).unread_fields, testing::IsEmpty());
 }

@@ -42,7 +42,8 @@ SegmentedBones BonesByThreshold(const Volume& scan_hu, double level_hu, const Pr
         "check the labels, and draw strokes (seeds) instead where they are wrong");
     return bones;
   }
-  bones.labels = RefinedParts(scan_hu, bones.labels, level_hu, progress.Part(0.3, 1.0));
+  bones.labels =
+      RefinedParts(scan_hu, bones.labels, PartingLevel(scan_hu, level_hu), progress.Part(0.3, 1.0));
   if (scan_hu.grid.spacing_mm.maxCoeff() > kGapMm) {
     bones.warnings.push_back(
         "the voxels are as thick as the gaps of joints, so bones that touch may not have come apart; check "

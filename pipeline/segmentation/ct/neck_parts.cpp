@@ -5,6 +5,7 @@
 
 #include "core/voxels/components.h"
 #include "core/voxels/distance_transform.h"
+#include "core/voxels/neighbours.h"
 
 namespace kvx {
 namespace {
@@ -56,15 +57,6 @@ class Basins {
   double voxel_mm_;
   std::vector<int32_t> parent_;
 };
-
-template <class Visit>
-void ForEachNeighbour(const Grid& grid, size_t at, Visit&& visit) {
-  const Eigen::Vector3i p = grid.Ijk(at);
-  for (int n = 0; n < 27; ++n) {
-    const Eigen::Vector3i q = p + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-    if (n != 13 && grid.Contains(q)) visit(grid.Index(q.x(), q.y(), q.z()));
-  }
-}
 
 }  // namespace
 

@@ -8,6 +8,7 @@
 
 #include "core/errors.h"
 #include "core/voxels/components.h"
+#include "core/voxels/neighbours.h"
 #include "pipeline/scans/air_level.h"
 #include "pipeline/segmentation/ct/joined_parts.h"
 #include "pipeline/segmentation/ct/neck_parts.h"
@@ -17,6 +18,8 @@ namespace {
 
 constexpr float kLeastHu = -200, kMostHu = 1500;  // air and metal say nothing about bone
 constexpr float kFatHu = -50;                     // much fat beside little bone would be a class of its own
+
+constexpr double kClearlyDenser = 1.15;  // than a level, another
 
 Mask Above(const Volume& scan, double level_hu) {
   Mask mask(scan.grid);
@@ -63,6 +66,41 @@ double LevelOfSurface(const Volume& scan, double rough_hu) {
   return slopes > 0 ? sum / slopes : rough_hu;
 }
 
+Image<int32_t> PartsAt(const Volume& scan, double level_hu, double least_seam) {
+  return JoinedParts(scan, PartAtNecks(FillHoles(Above(scan, level_hu))), least_seam);
+}
+
+// Without parts that are too small for a bone.
+void DropSmall(Image<int32_t>& part) {
+  std::vector<size_t> voxels(size_t(*std::ranges::max_element(part.values)) + 1, 0);
+  for (const int32_t p : part.values) ++voxels[size_t(p)];
+  const double least = kLeastBoneMm3 / part.grid.spacing_mm.prod();
+  for (int32_t& p : part.values)
+    if (double(voxels[size_t(p)]) < least) p = 0;
+}
+
+// `parts` of a lower level, those that hold parts of a higher one divided among these: each voxel goes to the
+// one that is fewest steps away.
+Image<int32_t> AsPartedBy(Image<int32_t> dense, const Image<int32_t>& parts) {
+  DropSmall(dense);
+  std::vector<uint8_t> holds(size_t(*std::ranges::max_element(parts.values)) + 1, 0);
+  std::vector<size_t> front;
+  for (size_t v = 0; v < dense.values.size(); ++v)
+    if (dense.values[v] != 0) holds[size_t(parts.values[v])] = 1, front.push_back(v);
+  for (size_t next = 0; next < front.size(); ++next) {
+    ForEachNeighbour(parts.grid, front[next], [&](size_t beside) {
+      const int32_t part = parts.values[beside];
+      if (part == 0 || !holds[size_t(part)] || dense.values[beside] != 0) return;
+      dense.values[beside] = dense.values[front[next]];
+      front.push_back(beside);
+    });
+  }
+  const int32_t others = *std::ranges::max_element(dense.values);
+  for (size_t v = 0; v < dense.values.size(); ++v)
+    if (parts.values[v] != 0 && dense.values[v] == 0) dense.values[v] = others + parts.values[v];
+  return dense;
+}
+
 }  // namespace
 
 double FindBoneLevel(const Volume& scan) {
@@ -75,8 +113,15 @@ double FindBoneLevel(const Volume& scan) {
   return LevelOfSurface(scan, OtsuThreshold(dense));
 }
 
+double PartingLevel(const Volume& scan, double level_hu) {
+  const double found_hu = FindBoneLevel(scan);
+  return found_hu > kClearlyDenser * level_hu ? found_hu : level_hu;
+}
+
 LabelMap ThresholdBones(const Volume& scan, double level_hu, double least_seam) {
-  const Image<int32_t> part = JoinedParts(scan, PartAtNecks(FillHoles(Above(scan, level_hu))), least_seam);
+  Image<int32_t> part = PartsAt(scan, level_hu, least_seam);
+  const double parting_hu = PartingLevel(scan, level_hu);
+  if (parting_hu > level_hu) part = AsPartedBy(PartsAt(scan, parting_hu, least_seam), part);
   const int32_t parts = *std::max_element(part.values.begin(), part.values.end());
   std::vector<size_t> voxels(size_t(parts) + 1, 0);
   for (const int32_t p : part.values) ++voxels[size_t(p)];

@@ -43,12 +43,13 @@ double Kept(const LabelMap& parts, const LabelMap& others) {
 }  // namespace
 
 double KeptOtherwise(const Volume& scan_hu, double level_hu) {
+  const double parting_hu = PartingLevel(scan_hu, level_hu);
   const VoxelBox all{Eigen::Vector3i::Zero(), scan_hu.grid.size};
   const Volume blocks = Coarser(scan_hu, {all, BlocksFor(all, scan_hu.grid, kMostBlocks).back()});
-  const LabelMap parts = PartsAt(blocks, level_hu);
-  const double at_other_levels = std::max(Kept(parts, PartsAt(blocks, (1 - kALittle) * level_hu)),
-                                          Kept(parts, PartsAt(blocks, (1 + kALittle) * level_hu)));
-  return std::min(at_other_levels, Kept(parts, PartsAt(blocks, level_hu, 0.5 * kLeastSeam)));
+  const LabelMap parts = PartsAt(blocks, parting_hu);
+  const double at_other_levels = std::max(Kept(parts, PartsAt(blocks, (1 - kALittle) * parting_hu)),
+                                          Kept(parts, PartsAt(blocks, (1 + kALittle) * parting_hu)));
+  return std::min(at_other_levels, Kept(parts, PartsAt(blocks, parting_hu, 0.5 * kLeastSeam)));
 }
 
 }  // namespace kvx

@@ -119,6 +119,27 @@ TEST(ThresholdBones, AHollowBoneWithASpongyEndIsOne) {
   EXPECT_EQ(std::set<uint16_t>(labels.values.begin(), labels.values.end()), (std::set<uint16_t>{0, 1}));
 }
 
+// A shaft of dense cortex whose ends are filled with spongy bone of 300 HU: at 200 HU they are solid and
+// wider than the shaft, so necks would part them.
+TEST(ThresholdBones, ALowLevelPartsBonesWhereTheDenserOneOfTheScanDoes) {
+  Grid grid;
+  grid.size = {50, 50, 120};
+  grid.spacing_mm.setConstant(0.5);
+  Volume scan(grid, 40.0f);
+  for (size_t v = 0; v < scan.values.size(); ++v) {
+    const Eigen::Vector3d mm = grid.Ijk(v).cast<double>() * 0.5 - Eigen::Vector3d(12, 12, 30);
+    const double along = std::abs(mm.z());
+    if (along > 27) continue;
+    const double inside_mm = (along > 14 ? 9.0 : 4.0) - std::hypot(mm.x(), mm.y());
+    if (inside_mm > 0) scan.values[v] = inside_mm < 1.5 ? 1200.0f : along > 14 ? 300.0f : -60.0f;
+  }
+  EXPECT_GT(PartingLevel(scan, 200), 400);
+  EXPECT_EQ(PartingLevel(scan, 900), 900);
+  const LabelMap labels = ThresholdBones(scan, 200);
+  EXPECT_EQ(std::set<uint16_t>(labels.values.begin(), labels.values.end()), (std::set<uint16_t>{0, 1}));
+  EXPECT_EQ(labels(24, 24, 104), 1) << "what the lower level adds is the bone's, too";
+}
+
 TEST(ThresholdBones, NothingAboveTheLevelIsSaidInWords) {
   EXPECT_THROW(ThresholdBones(Volume(SmallGrid(), 40.0f), 300), InputError);
 }

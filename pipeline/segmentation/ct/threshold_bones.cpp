@@ -19,7 +19,7 @@ namespace {
 constexpr float kLeastHu = -200, kMostHu = 1500;  // air and metal say nothing about bone
 constexpr float kFatHu = -50;                     // much fat beside little bone would be a class of its own
 
-constexpr double kClearlyDenser = 1.15;  // than a level, another
+constexpr double kClearlyDenser = 1.4;  // than a level, another
 
 Mask Above(const Volume& scan, double level_hu) {
   Mask mask(scan.grid);

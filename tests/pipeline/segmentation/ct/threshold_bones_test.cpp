@@ -130,8 +130,9 @@ TEST(ThresholdBones, ALowLevelPartsBonesWhereTheDenserOneOfTheScanDoes) {
     const Eigen::Vector3d mm = grid.Ijk(v).cast<double>() * 0.5 - Eigen::Vector3d(12, 12, 30);
     const double along = std::abs(mm.z());
     if (along > 27) continue;
-    const double inside_mm = (along > 14 ? 9.0 : 4.0) - std::hypot(mm.x(), mm.y());
-    if (inside_mm > 0) scan.values[v] = inside_mm < 1.5 ? 1200.0f : along > 14 ? 300.0f : -60.0f;
+    const double radius_mm = 4 + 5 * std::clamp((along - 8) / 8, 0.0, 1.0);
+    const double inside_mm = radius_mm - std::hypot(mm.x(), mm.y());
+    if (inside_mm > 0) scan.values[v] = inside_mm < 1.5 ? 1200.0f : along > 12 ? 300.0f : -60.0f;
   }
   EXPECT_GT(PartingLevel(scan, 200), 400);
   EXPECT_EQ(PartingLevel(scan, 900), 900);

@@ -39,7 +39,7 @@ class ElasticRelaxation : public testing::TestWithParam<Relaxer> {
 };
 INSTANTIATE_TEST_SUITE_P(Both, ElasticRelaxation,
                          testing::Values(Relaxer{"Device", true}, Relaxer{"Twin", false}),
-                         [](const auto& info) { return info.param.name; });
+                         [](const auto& one) { return one.param.name; });
 
 using Map = std::function<Eigen::Vector3d(const Eigen::Vector3d&)>;  // rest mm -> mm
 

@@ -61,8 +61,7 @@ TEST(BrickBody, TellsInnerTissueAndLoneVoxelsAsPlainLoopsDo) {
     const Mask inner = InnerOf(tissue);
     Mask joined = tissue;
     for (size_t v = 0; v < joined.values.size(); ++v) joined.values[v] |= inner.values[v];
-    const Mask body =
-        Decided(joined, [](bool tissue, const Beside& b) { return tissue && b.with_tissue > 0; });
+    const Mask body = Decided(joined, [](bool set, const Beside& b) { return set && b.with_tissue > 0; });
     BoneSet bones;
     bones.labels = LabelMap(tissue.grid);
     const BrickedBody b = BrickBody(tissue, bones, WeightMap(tissue.grid), 0, {});

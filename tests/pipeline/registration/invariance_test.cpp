@@ -208,7 +208,7 @@ TEST(InverseMap, BringsPointsBackAndKnowsWhatItDoesNotKnow) {
   const BoneSet no_bones = NoBones(grid);
   const BorderedField carried(field, no_bones, {});
   const InverseMap template_from_scan(carried, body, scan);
-  for (const Eigen::Vector3d x :
+  for (const Eigen::Vector3d& x :
        {Eigen::Vector3d(30, 30, 30), Eigen::Vector3d(36.3, 25.1, 33.8), Eigen::Vector3d(20.2, 31, 24)}) {
     const auto found = template_from_scan({x + SampleTrilinear(field, grid.ToVox(PointMm{x}))});
     ASSERT_TRUE(found.has_value());

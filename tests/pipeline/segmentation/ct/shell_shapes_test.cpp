@@ -46,10 +46,11 @@ TEST(ShapesOfShells, MarrowLiesDeepInAShellWithSmallGaps) {
   size_t marrow_voxels = 0;
   ball.ForEach(ball.Shape(), [&](const Eigen::Vector3d& mm, bool marrow, bool reach) {
     const double r = mm.norm();
-    if (r < 8 && mm.x() < 5) EXPECT_TRUE(marrow) << mm.transpose();
-    if (marrow) EXPECT_LT(r, 8.9);
-    if (r < 9.5 && mm.x() < 5) EXPECT_TRUE(reach) << mm.transpose();
-    if (reach) EXPECT_LT(r, 11.4) << "a voxel or two beyond";
+    const bool window = mm.x() >= 5;
+    EXPECT_TRUE(marrow || window || r >= 8) << mm.transpose();
+    EXPECT_TRUE(!marrow || r < 8.9) << mm.transpose();
+    EXPECT_TRUE(reach || window || r >= 9.5) << mm.transpose();
+    EXPECT_TRUE(!reach || r < 11.4) << "a voxel or two beyond: " << mm.transpose();
     marrow_voxels += marrow;
   });
   EXPECT_GT(marrow_voxels, 15000u);
@@ -58,14 +59,14 @@ TEST(ShapesOfShells, MarrowLiesDeepInAShellWithSmallGaps) {
 TEST(ShapesOfShells, WhatIsWideOpenEnclosesNothing) {
   const WindowedBall ball(8, 40);
   ball.ForEach(ball.Shape(), [](const Eigen::Vector3d& mm, bool marrow, bool) {
-    if (mm.norm() < 5) EXPECT_FALSE(marrow);
+    EXPECT_TRUE(!marrow || mm.norm() >= 5) << mm.transpose();
   });
 }
 
 TEST(ShapesOfShells, AThinShellEnclosesWhereBoneMayBeThoughNotMarrow) {
   const WindowedBall ball(8, 400);
   ball.ForEach(ball.Shape(), [](const Eigen::Vector3d& mm, bool marrow, bool reach) {
-    if (mm.norm() < 5) EXPECT_TRUE(reach && !marrow);
+    EXPECT_TRUE((reach && !marrow) || mm.norm() >= 5) << mm.transpose();
   });
 }
 

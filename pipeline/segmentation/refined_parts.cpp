@@ -2,13 +2,13 @@
 #include "pipeline/segmentation/refined_parts.h"
 
 #include <algorithm>
-#include <numeric>
 #include <set>
 
 #include "core/voxels/components.h"
 #include "core/voxels/dilated.h"
 #include "core/voxels/distance_transform.h"
 #include "core/voxels/grid_lines.h"
+#include "core/voxels/numbered_voxels.h"
 #include "pipeline/segmentation/ct/neck_parts.h"
 #include "pipeline/segmentation/ct/shell_shapes.h"
 #include "pipeline/segmentation/grow_bones.h"
@@ -88,11 +88,8 @@ LabelMap Others(LabelMap parts) {
 }
 
 LabelMap NumberedBySize(LabelMap parts) {
-  std::vector<size_t> voxels(size_t(*std::ranges::max_element(parts.values)) + 1, 0);
-  for (const uint16_t part : parts.values) ++voxels[part];
-  std::vector<uint16_t> by_size(voxels.size() - 1), number(voxels.size(), 0);
-  std::iota(by_size.begin(), by_size.end(), uint16_t(1));
-  std::ranges::stable_sort(by_size, [&](uint16_t a, uint16_t b) { return voxels[a] > voxels[b]; });
+  const std::vector<size_t> by_size = LargestFirst(VoxelsByNumber(parts));
+  std::vector<uint16_t> number(by_size.size() + 1, 0);
   for (size_t n = 0; n < by_size.size(); ++n) number[by_size[n]] = uint16_t(n + 1);
   for (uint16_t& part : parts.values) part = number[part];
   return parts;
@@ -128,12 +125,12 @@ void GiveBackMoreThanBorders(const Volume& scan_hu, const LabelMap& parts, Label
 
 }  // namespace
 
-LabelMap RefinedParts(const Volume& scan_hu, const LabelMap& parts, double level_hu,
+LabelMap RefinedParts(const Volume& scan_hu, const LabelMap& parts, double parting_hu,
                       const Progress& progress) {
   const Volume depth_mm = DistanceMapMm(Borders(parts));
   const PartSizes sizes(parts, depth_mm);
   const std::set<int> shells = sizes.Shells(parts.grid.MeanSpacingMm());
-  const std::map<int, ShellShape> shapes = ShapesOfShells(scan_hu, parts, shells, level_hu);
+  const std::map<int, ShellShape> shapes = ShapesOfShells(scan_hu, parts, shells, parting_hu);
   LabelMap sure = SureVoxels(parts, depth_mm, sizes, shells);
   AddMarrow(shapes, sure);
   const LabelMap others = Others(parts);

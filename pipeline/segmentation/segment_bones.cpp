@@ -32,18 +32,17 @@ void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
 }
 
 // Parts that are not sure are not looked at again: what their deep voxels stand for is not known.
-SegmentedBones BonesByThreshold(const Volume& scan_hu, double level_hu, const Progress& progress) {
-  SegmentedBones bones{ThresholdBones(scan_hu, level_hu), {}, true, {}, {}};
+SegmentedBones BonesByThreshold(const Volume& scan_hu, const BoneLevels& levels, const Progress& progress) {
+  SegmentedBones bones{ThresholdBones(scan_hu, levels), {}, true, {}, {}};
   progress.Report(SegmentBones::kName, 0.2);
-  if (KeptOtherwise(scan_hu, level_hu) < kSurelyKept) {
+  if (KeptOtherwise(scan_hu, levels.parting_hu) < kSurelyKept) {
     bones.warnings.push_back(
         "where bones meet in this scan is not sure (a threshold a little higher or lower, say, parts it "
         "otherwise): bones may be joined, or in pieces; "
         "check the labels, and draw strokes (seeds) instead where they are wrong");
     return bones;
   }
-  bones.labels =
-      RefinedParts(scan_hu, bones.labels, PartingLevel(scan_hu, level_hu), progress.Part(0.3, 1.0));
+  bones.labels = RefinedParts(scan_hu, bones.labels, levels.parting_hu, progress.Part(0.3, 1.0));
   if (scan_hu.grid.spacing_mm.maxCoeff() > kGapMm) {
     bones.warnings.push_back(
         "the voxels are as thick as the gaps of joints, so bones that touch may not have come apart; check "
@@ -95,9 +94,9 @@ SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, S
     return {std::move(grown.labels), {}, false, std::move(grown.doubts), std::move(grown.expected_dice)};
   }
   RequireThreshold(scan, options.level_hu);
-  const double level_hu = options.level_hu.value_or(FindBoneLevel(scan.volume));
+  const BoneLevels levels = LevelsOf(scan.volume, options.level_hu);
   context.progress.Report(kName, 0.2);
-  return BonesByThreshold(scan.volume, level_hu, context.progress.Part(0.2, 1.0));
+  return BonesByThreshold(scan.volume, levels, context.progress.Part(0.2, 1.0));
 }
 
 std::vector<ProposedBone> NamesOf(const SegmentedBones& bones, Region region) {

@@ -13,4 +13,9 @@ inline Grid PlainGrid(const Eigen::Vector3i& size, const Eigen::Vector3d& spacin
   return grid;
 }
 
+// Of cubes, from 0 on.
+inline Grid Cubes(const Eigen::Vector3i& size, double edge_mm) {
+  return PlainGrid(size, Eigen::Vector3d::Constant(edge_mm), Eigen::Vector3d::Zero());
+}
+
 }  // namespace kvx::testing_support

@@ -5,6 +5,7 @@
 
 #include "core/host/parallel.h"
 #include "core/voxels/gaussian_blur.h"
+#include "core/voxels/neighbours.h"
 #include "pipeline/registration/images/shown_voxels.h"
 #include "pipeline/registration/images/usual_residual.h"
 
@@ -42,12 +43,8 @@ std::vector<float> DisagreementBeside(const BlockLevel& level, std::span<const E
   std::vector<float> out(cells.size());
   ParallelEach(out.size(), [&](size_t c) {
     CellDisagreement sum;
-    for (int n = 0; n < 27; ++n) {
-      const Eigen::Vector3i p = grid.Ijk(c) + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-      if (!grid.Contains(p)) continue;
-      const CellDisagreement& near = cells[grid.Index(p.x(), p.y(), p.z())];
-      sum.squares += near.squares, sum.count += near.count;
-    }
+    ForEachAround(grid, c,
+                  [&](size_t near) { sum.squares += cells[near].squares, sum.count += cells[near].count; });
     out[c] = sum.squares / std::max(1.0f, sum.count);
   });
   return out;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/host/parallel.h"
+#include "core/voxels/neighbours.h"
 #include "core/voxels/sample_clamped.h"
 #include "pipeline/scans/alike_images.h"
 
@@ -60,10 +61,7 @@ Image<MeanVariance> Spread(const Image<MeanVariance>& given) {
   Image<MeanVariance> out = given;
   for (size_t c = 0; c < out.values.size(); ++c) {
     if (out.values[c].count > 0) continue;
-    for (int n = 0; n < 27; ++n) {
-      const Eigen::Vector3i beside = given.grid.Ijk(c) + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-      if (given.grid.Contains(beside)) out.values[c] += given(beside.x(), beside.y(), beside.z());
-    }
+    ForEachAround(given.grid, c, [&](size_t beside) { out.values[c] += given.values[beside]; });
   }
   return out;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/host/parallel.h"
+#include "core/voxels/neighbours.h"
 
 namespace kvx {
 namespace {
@@ -46,10 +47,7 @@ std::vector<double> AroundBlocks(const Grid& grid, const std::vector<Sums>& bloc
   std::vector<Sums> around(blocks.size());
   double count = 0;
   for (size_t b = 0; b < around.size(); ++b) {
-    for (int n = 0; n < 27; ++n) {
-      const Eigen::Vector3i p = grid.Ijk(b) + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-      if (grid.Contains(p)) around[b] += blocks[grid.Index(p.x(), p.y(), p.z())];
-    }
+    ForEachAround(grid, b, [&](size_t near) { around[b] += blocks[near]; });
     count += around[b].slopes > 0;
   }
   const Sums whole = Whole(blocks);

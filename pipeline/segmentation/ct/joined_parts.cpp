@@ -1,3 +1,4 @@
+// Seams and parts are measured once; pairs are then joined in rounds, what goes on most first.
 #include "pipeline/segmentation/ct/joined_parts.h"
 
 #include <algorithm>

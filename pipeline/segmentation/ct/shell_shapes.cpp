@@ -1,3 +1,4 @@
+// Shells are closed, filled and opened again, each in a box of its own.
 #include "pipeline/segmentation/ct/shell_shapes.h"
 
 #include <algorithm>

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "core/errors.h"
 #include "core/voxels/components.h"
 #include "core/voxels/neighbours.h"
+#include "core/voxels/numbered_voxels.h"
 #include "pipeline/scans/air_level.h"
 #include "pipeline/segmentation/ct/joined_parts.h"
 #include "pipeline/segmentation/ct/neck_parts.h"
@@ -18,8 +18,7 @@ namespace {
 
 constexpr float kLeastHu = -200, kMostHu = 1500;  // air and metal say nothing about bone
 constexpr float kFatHu = -50;                     // much fat beside little bone would be a class of its own
-
-constexpr double kClearlyDenser = 1.4;  // than a level, another
+constexpr double kClearlyDenser = 1.4;            // than a level, another
 
 Mask Above(const Volume& scan, double level_hu) {
   Mask mask(scan.grid);
@@ -72,8 +71,7 @@ Image<int32_t> PartsAt(const Volume& scan, double level_hu, double least_seam) {
 
 // Without parts that are too small for a bone.
 void DropSmall(Image<int32_t>& part) {
-  std::vector<size_t> voxels(size_t(*std::ranges::max_element(part.values)) + 1, 0);
-  for (const int32_t p : part.values) ++voxels[size_t(p)];
+  const std::vector<size_t> voxels = VoxelsByNumber(part);
   const double least = kLeastBoneMm3 / part.grid.spacing_mm.prod();
   for (int32_t& p : part.values)
     if (double(voxels[size_t(p)]) < least) p = 0;
@@ -113,25 +111,19 @@ double FindBoneLevel(const Volume& scan) {
   return LevelOfSurface(scan, OtsuThreshold(dense));
 }
 
-double PartingLevel(const Volume& scan, double level_hu) {
-  const double found_hu = FindBoneLevel(scan);
-  return found_hu > kClearlyDenser * level_hu ? found_hu : level_hu;
+BoneLevels LevelsOf(const Volume& scan, std::optional<double> given_hu) {
+  const double found_hu = FindBoneLevel(scan), bone_hu = given_hu.value_or(found_hu);
+  return {bone_hu, found_hu > kClearlyDenser * bone_hu ? found_hu : bone_hu};
 }
 
-LabelMap ThresholdBones(const Volume& scan, double level_hu, double least_seam) {
-  Image<int32_t> part = PartsAt(scan, level_hu, least_seam);
-  const double parting_hu = PartingLevel(scan, level_hu);
-  if (parting_hu > level_hu) part = AsPartedBy(PartsAt(scan, parting_hu, least_seam), part);
-  const int32_t parts = *std::max_element(part.values.begin(), part.values.end());
-  std::vector<size_t> voxels(size_t(parts) + 1, 0);
-  for (const int32_t p : part.values) ++voxels[size_t(p)];
-  std::vector<int32_t> by_size(static_cast<size_t>(parts));
-  std::iota(by_size.begin(), by_size.end(), 1);
-  std::stable_sort(by_size.begin(), by_size.end(),
-                   [&](int32_t a, int32_t b) { return voxels[a] > voxels[b]; });
-  std::vector<uint16_t> label_of(size_t(parts) + 1, 0);
+LabelMap ThresholdBones(const Volume& scan, const BoneLevels& levels, double least_seam) {
+  Image<int32_t> part = PartsAt(scan, levels.bone_hu, least_seam);
+  if (levels.parting_hu > levels.bone_hu)
+    part = AsPartedBy(PartsAt(scan, levels.parting_hu, least_seam), part);
+  const std::vector<size_t> voxels = VoxelsByNumber(part);
+  std::vector<uint16_t> label_of(voxels.size(), 0);
   uint16_t label = 0;
-  for (const int32_t p : by_size) {
+  for (const size_t p : LargestFirst(voxels)) {
     if (double(voxels[p]) * scan.grid.spacing_mm.prod() >= kLeastBoneMm3 && label < 65000)
       label_of[p] = ++label;
   }

@@ -16,7 +16,7 @@ constexpr double kALittle = 0.15;  // of the level
 
 LabelMap PartsAt(const Volume& scan_hu, double level_hu, double least_seam = kLeastSeam) {
   try {
-    return ThresholdBones(scan_hu, level_hu, least_seam);
+    return ThresholdBones(scan_hu, {level_hu, level_hu}, least_seam);
   } catch (const InputError&) {  // nothing is as dense
     return LabelMap(scan_hu.grid);
   }
@@ -42,8 +42,7 @@ double Kept(const LabelMap& parts, const LabelMap& others) {
 
 }  // namespace
 
-double KeptOtherwise(const Volume& scan_hu, double level_hu) {
-  const double parting_hu = PartingLevel(scan_hu, level_hu);
+double KeptOtherwise(const Volume& scan_hu, double parting_hu) {
   const VoxelBox all{Eigen::Vector3i::Zero(), scan_hu.grid.size};
   const Volume blocks = Coarser(scan_hu, {all, BlocksFor(all, scan_hu.grid, kMostBlocks).back()});
   const LabelMap parts = PartsAt(blocks, parting_hu);

@@ -5,6 +5,8 @@
 
 #include <set>
 
+#include "tests/support/plain_grid.h"
+
 namespace kvx {
 namespace {
 
@@ -17,9 +19,7 @@ struct CutBody {
 
   template <class Inside>
   CutBody(double cut_mm, float depth_mm, const Inside& inside) {
-    Grid grid;
-    grid.size = {90, 50, 50};
-    grid.spacing_mm.setConstant(0.5);
+    const Grid grid = testing_support::Cubes({90, 50, 50}, 0.5);
     scan = Volume(grid, 40.0f);
     parts = {Image<int32_t>(grid, 0), {0.0f, depth_mm, depth_mm}};
     for (size_t v = 0; v < scan.values.size(); ++v) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/plain_grid.h"
+
 namespace kvx {
 namespace {
 
@@ -15,9 +17,7 @@ struct WindowedBall {
   LabelMap parts;
 
   WindowedBall(double window_mm, float in_window_hu) {
-    Grid grid;
-    grid.size = {60, 60, 60};
-    grid.spacing_mm.setConstant(0.5);
+    const Grid grid = testing_support::Cubes({60, 60, 60}, 0.5);
     scan = Volume(grid, 40.0f);
     parts = LabelMap(grid);
     for (size_t v = 0; v < scan.values.size(); ++v) {

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/errors.h"
+#include "tests/support/plain_grid.h"
 
 namespace kvx {
 namespace {
@@ -38,7 +39,7 @@ TEST(ThresholdBones, PartsTouchingBallsAndFillsTheirMarrow) {
   const double level = FindBoneLevel(scan);
   EXPECT_GT(level, 40);
   EXPECT_LT(level, 900);
-  const LabelMap labels = ThresholdBones(scan, level);
+  const LabelMap labels = ThresholdBones(scan, LevelsOf(scan, level));
   EXPECT_EQ(std::set<uint16_t>(labels.values.begin(), labels.values.end()), (std::set<uint16_t>{0, 1, 2}));
   size_t wrong = 0, all = 0;
   for (size_t v = 0; v < labels.values.size(); ++v) {
@@ -103,9 +104,7 @@ TEST(FindBoneLevel, IsNotThatOfMuscleInFat) {
 // The end of a long bone as CT shows it: cortex of 1.5 mm that the view cuts, marrow of fat, and at the end a
 // mesh of rods 0.8 mm thick, 1.6 mm apart.
 TEST(ThresholdBones, AHollowBoneWithASpongyEndIsOne) {
-  Grid grid;
-  grid.size = {56, 56, 80};
-  grid.spacing_mm.setConstant(0.4);
+  const Grid grid = testing_support::Cubes({56, 56, 80}, 0.4);
   Volume scan(grid, 40.0f);
   for (size_t v = 0; v < scan.values.size(); ++v) {
     const Eigen::Vector3i p = grid.Ijk(v);
@@ -115,16 +114,14 @@ TEST(ThresholdBones, AHollowBoneWithASpongyEndIsOne) {
     const int rods = (p.x() % 6 < 2) + (p.y() % 6 < 2) + (p.z() % 6 < 2);
     scan.values[v] = to_surface > -1.5 ? 1200.0f : mm.z() > -6 && rods > 1 ? 900.0f : -60.0f;
   }
-  const LabelMap labels = ThresholdBones(scan, FindBoneLevel(scan));
+  const LabelMap labels = ThresholdBones(scan, LevelsOf(scan, std::nullopt));
   EXPECT_EQ(std::set<uint16_t>(labels.values.begin(), labels.values.end()), (std::set<uint16_t>{0, 1}));
 }
 
 // A shaft of dense cortex whose ends are filled with spongy bone of 300 HU: at 200 HU they are solid and
 // wider than the shaft, so necks would part them.
 TEST(ThresholdBones, ALowLevelPartsBonesWhereTheDenserOneOfTheScanDoes) {
-  Grid grid;
-  grid.size = {50, 50, 120};
-  grid.spacing_mm.setConstant(0.5);
+  const Grid grid = testing_support::Cubes({50, 50, 120}, 0.5);
   Volume scan(grid, 40.0f);
   for (size_t v = 0; v < scan.values.size(); ++v) {
     const Eigen::Vector3d mm = grid.Ijk(v).cast<double>() * 0.5 - Eigen::Vector3d(12, 12, 30);
@@ -134,15 +131,15 @@ TEST(ThresholdBones, ALowLevelPartsBonesWhereTheDenserOneOfTheScanDoes) {
     const double inside_mm = radius_mm - std::hypot(mm.x(), mm.y());
     if (inside_mm > 0) scan.values[v] = inside_mm < 1.5 ? 1200.0f : along > 12 ? 300.0f : -60.0f;
   }
-  EXPECT_GT(PartingLevel(scan, 200), 400);
-  EXPECT_EQ(PartingLevel(scan, 900), 900);
-  const LabelMap labels = ThresholdBones(scan, 200);
+  EXPECT_GT(LevelsOf(scan, 200).parting_hu, 400);
+  EXPECT_EQ(LevelsOf(scan, 900).parting_hu, 900);
+  const LabelMap labels = ThresholdBones(scan, LevelsOf(scan, 200));
   EXPECT_EQ(std::set<uint16_t>(labels.values.begin(), labels.values.end()), (std::set<uint16_t>{0, 1}));
   EXPECT_EQ(labels(24, 24, 104), 1) << "what the lower level adds is the bone's, too";
 }
 
 TEST(ThresholdBones, NothingAboveTheLevelIsSaidInWords) {
-  EXPECT_THROW(ThresholdBones(Volume(SmallGrid(), 40.0f), 300), InputError);
+  EXPECT_THROW(ThresholdBones(Volume(SmallGrid(), 40.0f), {300, 300}), InputError);
 }
 
 }  // namespace

@@ -15,8 +15,6 @@ constexpr int kKnots = 24;
 constexpr double kTail = 0.01;           // of the template's values beyond the first and the last knot
 constexpr double kLeastShare = 0.002;    // of all values, for a knot to speak for itself
 constexpr double kLeastExplained = 0.1;  // more of the scan's variance than the line explains
-constexpr double kLeastSurely = 0.015;   // the same, of values that surely lie right
-constexpr double kLeastOfLeft = 0.11;    // and of what the line leaves of those
 
 double Mean(const std::vector<float>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
@@ -48,6 +46,17 @@ struct Explained {
   double by_line = 0, by_curve = 0;  // shares of the scan's variance
   double Gain() const { return by_curve - by_line; }
 };
+
+// Little more than the line explains may still be a curve: where it is much of what the line leaves. Shading
+// and misplaced tissue bend greys, too, but leave more that neither explains.
+struct Bend {
+  double least_gain, least_of_left;
+  bool IsIn(const Explained& explained) const {
+    return explained.Gain() >= least_gain && explained.Gain() >= least_of_left * (1 - explained.by_line);
+  }
+};
+constexpr Bend kBendOfAll{0.02, 0.14};      // muscle gone dark beside fat that has not
+constexpr Bend kBendOfSurely{0.015, 0.11};  // of values that surely lie right
 
 Explained Compare(const ContrastMap& map, const std::vector<float>& t, const std::vector<float>& s) {
   const double n = double(t.size());
@@ -99,12 +108,9 @@ class Curve {
   std::vector<std::vector<float>> knots_;  // the scan's values
 };
 
-// Shading bends greys, too, but leaves more that neither explains.
 bool IsSurelyBent(const GreyPairs& surely) {
   const Curve curve(surely);
-  if (!curve.Exists()) return false;
-  const Explained explained = curve.ByMeans();
-  return explained.Gain() >= kLeastSurely && explained.Gain() >= kLeastOfLeft * (1 - explained.by_line);
+  return curve.Exists() && kBendOfSurely.IsIn(curve.ByMeans());
 }
 
 }  // namespace
@@ -121,13 +127,18 @@ Volume Mapped(Volume volume, const std::optional<ContrastMap>& contrast) {
   return volume;
 }
 
-std::optional<ContrastMap> FitContrast(const GreyPairs& pairs) { return FitContrast(pairs, {}); }
+std::optional<ContrastMap> FitContrast(const GreyPairs& pairs) {
+  const Curve curve(pairs);
+  if (!curve.Exists() || curve.ByMeans().Gain() < kLeastExplained) return std::nullopt;
+  return curve.ByMedians();
+}
 
 std::optional<ContrastMap> FitContrast(const GreyPairs& all, const GreyPairs& surely) {
   const Curve curve(all);
   if (!curve.Exists()) return std::nullopt;
-  if (curve.ByMeans().Gain() < kLeastExplained && !IsSurelyBent(surely)) return std::nullopt;
-  return curve.ByMedians();
+  const Explained explained = curve.ByMeans();
+  const bool bent = explained.Gain() >= kLeastExplained || kBendOfAll.IsIn(explained) || IsSurelyBent(surely);
+  return bent ? std::optional(curve.ByMedians()) : std::nullopt;
 }
 
 }  // namespace kvx

@@ -30,8 +30,9 @@ struct GreyPairs {
 // explains them as well: then gain and bias are enough, and are not bent by what is in the wrong place.
 std::optional<ContrastMap> FitContrast(const GreyPairs& pairs);
 
-// As above, from `all`; there may be a curve as well where the pairs that are `surely` of the same tissue say
-// so. What is misplaced spreads greys, so that a curve explains little more than a line.
+// As above, from `all`, of which most lies right; there is a curve as well where it explains much of what a
+// line leaves, of all or of those that are `surely` of the same tissue. What is misplaced spreads greys, so
+// that a curve explains little more than a line.
 std::optional<ContrastMap> FitContrast(const GreyPairs& all, const GreyPairs& surely);
 
 }  // namespace kvx

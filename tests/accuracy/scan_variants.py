@@ -194,6 +194,18 @@ def saturated(study):
 
 
 @variant
+def later_echo(study):
+    """Muscle nearly dark, fat as bright as before."""
+    study.change_scans(lambda values, affine: (np.maximum(values, 0) ** 2 / np.percentile(values, 99.5), affine))
+
+
+@variant
+def earlier_echo(study):
+    """Muscle nearly as bright as fat."""
+    study.change_scans(lambda values, affine: (np.sqrt(np.maximum(values, 0) * np.percentile(values, 99.5)), affine))
+
+
+@variant
 def few_greys(study):
     """Twelve greys."""
     study.change_scans(lambda values, affine: (np.round(values / values.max() * 11), affine))

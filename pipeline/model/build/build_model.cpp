@@ -237,8 +237,10 @@ class Build {
                    measures = Named(shares_.Next(kMeasuresCost), "measures");
     SideBySide([&] { MakeExample(s, example); }, [&] { s.measures->Make(measures.Silent()); });
     measures.Report("measures", 1.0);
+    const auto measured = s.measures->Borrow();
+    AddWarnings(LessAlikeWarnings(s.study.name, measured->by_stage));
     if (options_.method != RegistrationMethod::kPaper)  // which states no confidence
-      AddWarnings(UnsureTissueWarnings(s.study.name, s.measures->Borrow()->confidence.unsure_fraction));
+      AddWarnings(UnsureTissueWarnings(s.study.name, measured->confidence.unsure_fraction));
     s.registered->Release();
     s.scan->Release();
   }

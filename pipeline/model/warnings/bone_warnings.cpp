@@ -16,6 +16,7 @@ namespace kvx {
 namespace {
 
 constexpr double kMuchUnsure = 0.25;  // of the body; scans of every day have a tenth at most
+constexpr double kMuchLess = 0.03;    // of a measure; noise and sampling take less
 
 // "scan 'a', bones 'x', 'y' are doubtful: ..."
 std::vector<std::string> Lines(const std::string& scan, const Sayings& doubtful) {
@@ -128,6 +129,19 @@ std::vector<std::string> UnsureTissueWarnings(const std::string& scan, double pa
           " % of the body, outside the scan's view, or since ghosts, motion, noise or shading hide it; "
           "'kinevox field --scan --confidence', or of a service's model '/registration?map=confidence', "
           "shows where"};
+}
+
+std::vector<std::string> LessAlikeWarnings(const std::string& scan,
+                                           const std::map<std::string, Measures>& by_stage) {
+  const Measures &bones = by_stage.at("initialise"), &all = by_stage.at("register");
+  const bool less = all.ssd > (1 + kMuchLess) * bones.ssd && all.cc < (1 - kMuchLess) * bones.cc &&
+                    all.mi < (1 - kMuchLess) * bones.mi;
+  if (!less) return {};
+  return {
+      "scan '" + scan +
+      "': registration left it less like the template than the bones alone did, so tissue away from bones "
+      "may be far off in it; look at both ('kinevox evaluate --pictures'), and leave the scan out of the "
+      "study where they do not fit"};
 }
 
 std::string HiddenTissueText(const std::string& scan, double part) {

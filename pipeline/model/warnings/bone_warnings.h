@@ -1,9 +1,11 @@
 // What a user is told about bones whose poses in a scan are in doubt.
 #pragma once
+#include <map>
 #include <string>
 #include <vector>
 
 #include "core/bone.h"
+#include "core/measures.h"
 #include "core/pose.h"
 #include "pipeline/bones/refine/pose_hint.h"
 
@@ -32,5 +34,10 @@ std::string HiddenTissueText(const std::string& scan, double part);
 
 // A line where the registration is unsure in so much of the body that something is wrong with the scan.
 std::vector<std::string> UnsureTissueWarnings(const std::string& scan, double part);
+
+// A line where registration left a scan less like the template than bones alone do, by every measure.
+// `by_stage`: as MeasureScan::Output has them.
+std::vector<std::string> LessAlikeWarnings(const std::string& scan,
+                                           const std::map<std::string, Measures>& by_stage);
 
 }  // namespace kvx

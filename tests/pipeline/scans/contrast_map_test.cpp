@@ -80,6 +80,17 @@ TEST(ContrastMap, NorIsABendThatExplainsLittleOfWhatALineLeaves) {
   EXPECT_FALSE(FitContrast(Misplaced(line), line));
 }
 
+// A line explains nine tenths of it, as of scans that differ in nothing but noise.
+TEST(ContrastMap, TissueThatHasGoneDarkIsABend) {
+  const GreyPairs greys = Through([](double x) { return x < 80 ? 0.3 * x : 0.9 * x; }, 10), none;
+  EXPECT_FALSE(FitContrast(greys));
+  const auto map = FitContrast(greys, none);
+  ASSERT_TRUE(map);
+  EXPECT_NEAR((*map)(40), 12, 3);
+  EXPECT_NEAR((*map)(150), 135, 3);
+  EXPECT_FALSE(FitContrast(Through([](double x) { return 0.9 * x; }, 18), none)) << "but noise is none";
+}
+
 TEST(ContrastMap, FlatOrEmptyImagesHaveNone) {
   GreyPairs flat;
   for (int n = 0; n < 100; ++n) flat.Add(7, 7);

@@ -141,5 +141,16 @@ TEST(UnsureTissueWarnings, TellOfScansThatAreUnsureInMuchOfTheBody) {
                                          HasSubstr("map=confidence"))));
 }
 
+TEST(LessAlikeWarnings, TellOfScansThatEveryMeasureSaysWereLeftWorse) {
+  const Measures bones{.ssd = 17.1, .cc = 0.96, .mi = 1.48}, worse{.ssd = 21.1, .cc = 0.926, .mi = 1.31};
+  const auto warnings = [&](const Measures& registered) {
+    return LessAlikeWarnings("pose01", {{"source", {}}, {"initialise", bones}, {"register", registered}});
+  };
+  EXPECT_THAT(warnings(worse), testing::ElementsAre(AllOf(HasSubstr("'pose01'"), HasSubstr("evaluate"))));
+  EXPECT_TRUE(warnings({.ssd = worse.ssd, .cc = worse.cc, .mi = 1.5}).empty()) << "in another contrast";
+  EXPECT_TRUE(warnings({.ssd = 17.2, .cc = 0.955, .mi = 1.47}).empty()) << "by noise";
+  EXPECT_TRUE(warnings({.ssd = 5, .cc = 0.99, .mi = 2}).empty());
+}
+
 }  // namespace
 }  // namespace kvx

@@ -12,6 +12,7 @@
 #include "pipeline/scans/extremes.h"
 #include "pipeline/scans/filled_corners.h"
 #include "pipeline/scans/grey_kind.h"
+#include "pipeline/skinning/dark_bone.h"
 #include "pipeline/skinning/dim_tissue.h"
 #include "pipeline/skinning/without_surroundings.h"
 
@@ -145,9 +146,11 @@ Mask SegmentBody::Run(const Inputs& inputs, const Options&, StageContext& contex
   const Mask pieces = KeepLargePieces(AboveSkinLevel(smooth, tissue, *level), kSmallPiece);
   const Mask bright = WithoutGhosts(smooth, pieces, *level);
   // In MR, tables and casts are dark, and skin over dark tendons is a shell of its own
-  return WithoutOtherLimbs(FillHoles(IsMagnitude(scan.volume) ? WithDimTissue(smooth, bright, *level)
-                                                              : WithoutSurroundings(bright, *inputs.bones)),
-                           *inputs.bones);
+  const Mask body =
+      WithoutOtherLimbs(FillHoles(IsMagnitude(scan.volume) ? WithDimTissue(smooth, bright, *level)
+                                                           : WithoutSurroundings(bright, *inputs.bones)),
+                        *inputs.bones);
+  return WithDarkBone(body, inputs.bones->labels);
 }
 
 }  // namespace kvx

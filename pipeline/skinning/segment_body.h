@@ -7,10 +7,11 @@ namespace kvx {
 
 // Voxels brighter than 0.35 of the way from air to the tissue around them, without small or dim pieces, holes
 // (bones, vessels) and dim tissue between bright one filled (`WithDimTissue`); without other limbs, and in CT
-// without tables and casts (`WithoutSurroundings`). A scan without air is all body.
+// without tables and casts (`WithoutSurroundings`), and with dark bone in its gaps (`WithDarkBone`). A scan
+// without air is all body.
 struct SegmentBody {
   static constexpr std::string_view kName = "body";
-  static constexpr int kVersion = 5;
+  static constexpr int kVersion = 6;
   struct Inputs {
     const Artifact<Scan>& scan;
     const Artifact<BoneSet>& bones;

@@ -61,6 +61,32 @@ TEST(SegmentBody, MagnitudeNoiseBiasAndDarkBones) {
   }
 }
 
+// A shaft's marrow and the tissue around it, with cortex and a tendon on it that leave the scan with it: open
+// at the border, where coils fade, they are no hole.
+TEST(SegmentBody, CortexBesideATendonThatLeavesTheScanIsBody) {
+  const Limb limb;
+  Volume mr(limb.grid);
+  BoneSet bones{{}, LabelMap(limb.grid), {}};
+  LabelMap shifted(limb.grid);
+  for (size_t v = 0; v < mr.values.size(); ++v) {
+    const Eigen::Vector3i p = limb.grid.Ijk(v);
+    const double r = std::hypot(p.x() - 20.0, p.y() - 18.0);
+    const bool tendon = r >= 5 && r < 8 && p.x() > 20 && std::abs(p.y() - 18) < 4;
+    const bool seen = p.z() > 0 && p.z() < 29 && !tendon && (r < 3 || r >= 5);
+    mr.values[v] = limb.truth.values[v] && seen ? 100.0f : 0.0f;
+    bones.labels.values[v] = r < 5 && p.z() > 0 && p.z() < 29;
+    shifted.values[v] = std::hypot(p.x() - 33.0, p.y() - 18.0) < 5;
+  }
+  const Mask body = BodyOf(mr, "MR", bones);
+  for (size_t v = 0; v < mr.values.size(); ++v)
+    ASSERT_TRUE(body.values[v] || bones.labels.values[v] == 0) << limb.grid.Ijk(v).transpose();
+  const Mask around_none = BodyOf(mr, "MR");
+  EXPECT_FALSE(around_none(24, 18, 15)) << "nothing but a label tells that cortex";
+  bones.labels = shifted;
+  const Mask beside = BodyOf(mr, "MR", bones);
+  EXPECT_FALSE(beside(36, 18, 15)) << "a label in the air makes no body";
+}
+
 TEST(SegmentBody, HounsfieldUnits) {
   const Limb limb;
   Volume ct(limb.grid, -1000.0f);

@@ -14,15 +14,19 @@ struct LevelSample {
   double intensity = 0;
 };
 
-// A mean of the bright samples around, near ones first. Dark samples (cortical bone) are told apart by
-// themselves.
+// From the bright samples around, near ones first. Dark samples (cortical bone) are told apart by themselves.
+// Where coils fade, samples lie on the bright side of a place at the end of a bone: a mean of them is too
+// bright there, a plane through them is not. What lies in a small bone says too little of a slope.
 class MarrowLevel {
  public:
-  explicit MarrowLevel(std::vector<LevelSample> samples);
+  enum Fit { kMean, kPlane };
+
+  explicit MarrowLevel(std::vector<LevelSample> samples, Fit fit = kMean);
   bool empty() const { return samples_.empty(); }
   double At(const PointMm& place) const;
 
  private:
+  Fit fit_;
   std::vector<LevelSample> samples_;  // the bright ones
 };
 

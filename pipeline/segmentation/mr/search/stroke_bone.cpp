@@ -105,8 +105,11 @@ StrokeBone::StrokeBone(const Volume& scan, const LabelMap& strokes, const LabelM
   FindLean();
 }
 
+// Strokes are too few, and too many of them on borders, to tell a slope by.
 Volume StrokeBone::Relative(const Mask& bone) const {
-  return RelativeTo(MarrowLevel(SamplesOf(scan_, bone)), scan_);
+  const bool sloping = !found_.values.empty() && size_mm_ > kLongMm;
+  return RelativeTo(MarrowLevel(SamplesOf(scan_, bone), sloping ? MarrowLevel::kPlane : MarrowLevel::kMean),
+                    scan_);
 }
 
 bool StrokeBone::SureStroke(size_t v) const { return own_.values[v] && relative_.values[v] >= kSurelyMarrow; }

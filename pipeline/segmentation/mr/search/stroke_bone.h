@@ -17,6 +17,8 @@ struct TissueCounts {
   double CortexLevel() const;  // relative intensity; what is usual when hardly a stroke shows cortex
 };
 
+constexpr double kLongMm = 80;  // strokes of shafts, which go on out of the scan
+
 struct StrokeSearch {
   bool tight = false;  // nothing far outside the hull of the strokes; for bones that strokes fill well
   bool far = false;    // farther from the strokes than bones usually reach, and into much else (farther.h)

@@ -12,7 +12,7 @@ namespace kvx {
 namespace {
 
 constexpr double kMarginMm = 10, kMarginOfDiagonal = 0.25;
-constexpr double kLongMm = 80, kLongMarginOfDiagonal = 0.5;  // shafts, which go on out of the scan
+constexpr double kLongMarginOfDiagonal = 0.5;
 constexpr int kRounds = 2;
 constexpr int kMostGrowth = 3;
 

@@ -13,6 +13,7 @@
 #include "pipeline/segmentation/ct/ct_bones.h"
 #include "pipeline/segmentation/ct/part_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
+#include "pipeline/segmentation/mr/levels/muscle_level.h"
 #include "pipeline/segmentation/mr/mr_bones.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
 
@@ -182,15 +183,17 @@ class Grower {
 // way up from no signal.
 GrownBones GrowBones(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress,
                      const LabelMap* previous) {
+  if (ct) return Grower(scan, strokes, true, progress, previous).Run();
   const Grid order = RightFrontUp(scan.grid);
-  if (ct || (order == scan.grid && ZeroLevelOf(scan) == 0))
-    return Grower(scan, strokes, ct, progress, previous).Run();
+  if (order == scan.grid && ZeroLevelOf(scan) == 0)
+    return Grower(*WithUsualMuscle(scan, strokes), strokes, false, progress, previous).Run();
   Volume from_zero = InOrderOf(order, scan);
   const float zero = float(ZeroLevelOf(from_zero));
   for (float& value : from_zero.values) value -= zero;
   const LabelMap marks = InOrderOf(order, strokes),
                  before = previous ? InOrderOf(order, *previous) : LabelMap();
-  GrownBones grown = Grower(from_zero, marks, false, progress, previous ? &before : nullptr).Run();
+  GrownBones grown =
+      Grower(*WithUsualMuscle(from_zero, marks), marks, false, progress, previous ? &before : nullptr).Run();
   grown.labels = InOrderOf(scan.grid, grown.labels);
   return grown;
 }

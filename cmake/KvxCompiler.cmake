@@ -9,7 +9,7 @@ if(NOT CMAKE_BUILD_TYPE)
 endif()
 option(KVX_BUILD_TESTS "Build the tests" ON)
 option(KVX_BUILD_BENCH "Build the benchmarks; KVX_BUILD_TESTS too" ON)
-set(KVX_SANITIZE "" CACHE STRING "address, undefined, thread or address,undefined; see CMakePresets.json")
+set(KVX_SANITIZE "" CACHE STRING "What -fsanitize= takes; CMakePresets.json has what is used")
 
 find_program(CCACHE_PROGRAM ccache)
 if(CCACHE_PROGRAM)

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <condition_variable>
+#include <limits>
 #include <mutex>
 
 #include "core/errors.h"
@@ -189,7 +190,9 @@ std::vector<JobRecord> JobQueue::OfBatch(const std::string& batch) {
 }
 
 std::vector<JobRecord> JobQueue::BeforeInLine(const JobRecord& queued) {
-  return db_.Read([&](SQLite::Database& db) { return sqlite::All(db, "jobs_before", JobRow, queued.seq); });
+  constexpr int64_t kEver = std::numeric_limits<int64_t>::max();  // those that wait to be tried again, too
+  return db_.Read(
+      [&](SQLite::Database& db) { return sqlite::All(db, "jobs_before", JobRow, kEver, queued.seq); });
 }
 
 std::vector<StageTime> JobQueue::StagesOf(const std::string& job) {
@@ -244,7 +247,7 @@ std::optional<ClaimedJob> JobQueue::Claim(const std::string& worker) {
       return ClaimedJob{
           Text(r, 0), Text(r, 1), Text(r, 2), Text(r, 3), Integer(r, 4), token, r.getColumn(5).getDouble()};
     };
-    auto job = sqlite::One(db, "claim_next_job", row, worker, token, db_.SteadyMs() + lease_ms_, now,
+    auto job = sqlite::One(db, "claim_next_job", row, now, worker, token, db_.SteadyMs() + lease_ms_,
                            memory_budget_);
     if (job) Note(db, job->id, now);
     return job;

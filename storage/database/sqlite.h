@@ -13,10 +13,14 @@ std::string_view EmbeddedSql(std::string_view file_name);  // generated at build
 
 namespace sqlite {
 
+// What the first line includes ("-- include line_of_jobs.sql") is pasted there.
 inline std::string Sql(std::string_view name) {
-  const std::string_view sql = EmbeddedSql(std::string(name) + ".sql");
+  constexpr std::string_view kInclude = "-- include ", kEnding = ".sql";
+  const std::string_view sql = EmbeddedSql(std::string(name) + std::string(kEnding));
   if (sql.empty()) throw std::logic_error("an SQL statement is missing from the program");
-  return std::string(sql);
+  if (!sql.starts_with(kInclude)) return std::string(sql);
+  const size_t end = sql.find('\n'), length = end - kInclude.size() - kEnding.size();
+  return Sql(sql.substr(kInclude.size(), length)) + std::string(sql.substr(end + 1));
 }
 
 inline void BindOne(SQLite::Statement& s, int i, int64_t v) { s.bind(i, v); }

@@ -171,45 +171,6 @@ TEST(JobQueue, AJobBeyondAllMemoryRunsAlone) {
   EXPECT_EQ(w.jobs.Claim("a")->id, id);
 }
 
-TEST(JobQueue, KnowsWhatIsBeforeAJob) {
-  QueueWorld w;
-  const auto running = w.Submit(), first = w.Submit(), second = w.Submit(), urgent = w.Submit(1);
-  EXPECT_EQ(w.jobs.Claim("a")->id, urgent.id);
-  EXPECT_EQ(w.jobs.Claim("a")->id, running.id);
-  EXPECT_EQ(w.jobs.BeforeInLine(w.jobs.Require(first.id)).size(), 2u);
-  EXPECT_EQ(w.jobs.BeforeInLine(w.jobs.Require(second.id)).size(), 3u);
-}
-
-// Forty of one that came first do not make the other wait for all of them, whatever priority they have.
-TEST(JobQueue, ProjectsTakeTurns) {
-  QueueWorld w;
-  JobQueue one = w.jobs.ForProject("one"), other = w.jobs.ForProject("other");
-  const auto submit = [](JobQueue& jobs, int priority) {
-    return jobs.Submit({"build_model", "mdl", "{}", priority}).id;
-  };
-  const std::string first = submit(one, 0), second = submit(one, 0), urgent = submit(one, 9),
-                    others = submit(other, 0), others_next = submit(other, 0);
-  const auto before = [&](const std::string& id) { return w.jobs.BeforeInLine(w.jobs.Require(id)).size(); };
-  const std::vector<std::string> line{urgent, others, first, others_next, second};
-  for (size_t i = 0; i < line.size(); ++i) EXPECT_EQ(before(line[i]), i);
-  for (size_t i = 0; i < line.size(); ++i) {
-    EXPECT_EQ(w.jobs.Claim("a")->id, line[i]) << i;
-    w.now_ms += 1;
-    for (size_t k = i + 1; k < line.size(); ++k) EXPECT_EQ(before(line[k]), k) << "running ones, too";
-  }
-}
-
-TEST(JobQueue, WhoHasBegunNoneYetIsNext) {
-  QueueWorld w;
-  JobQueue one = w.jobs.ForProject("one"), other = w.jobs.ForProject("other");
-  const auto submit = [](JobQueue& jobs) { return jobs.Submit({"build_model", "mdl", "{}"}).id; };
-  submit(one), submit(one);
-  w.jobs.Claim("a");
-  w.now_ms += 1;
-  const std::string late = submit(other);
-  EXPECT_EQ(w.jobs.Claim("a")->id, late);
-}
-
 TEST(JobQueue, TheEndOfAJobPutsAMessageInTheOutbox) {
   QueueWorld w;
   WebhookOutbox outbox(w.database);

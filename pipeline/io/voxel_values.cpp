@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <limits>
 
@@ -14,6 +15,8 @@ namespace {
 
 // Of a volume's longest side: beyond, its unit is another.
 constexpr double kSmallestMm = 1, kLargestMm = 3000;
+// Of a voxel's sides: scanners of fingers resolve 0.005 mm, and what is wider than 50 mm shows no bone.
+constexpr double kNarrowestMm = 0.002, kWidestMm = 50;
 
 template <class Visitor>
 decltype(auto) Visit(VoxelType type, Visitor&& visitor) {
@@ -228,6 +231,14 @@ void RequirePlausible(const Grid& grid, VoxelType type, double available_bytes) 
     throw InputError(
         "the volume's header makes it smaller than a millimetre or longer than three metres; correct its "
         "voxel spacing, which is in mm");
+  }
+  if (grid.spacing_mm.minCoeff() < kNarrowestMm || grid.spacing_mm.maxCoeff() > kWidestMm) {
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "the volume's header gives voxels of %.3g x %.3g x %.3g mm, and no scan of bones has any "
+                  "narrower than %g or wider than %g mm; correct its voxel spacing, which is in mm",
+                  grid.spacing_mm.x(), grid.spacing_mm.y(), grid.spacing_mm.z(), kNarrowestMm, kWidestMm);
+    throw InputError(text);
   }
 }
 

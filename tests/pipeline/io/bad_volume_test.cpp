@@ -106,6 +106,9 @@ TEST_F(BadNifti, OneBrokenFieldAtATime) {
          for (int d = 0; d < 3; ++d) Set<float>(80 + 4 * d, 0.002f);
        },
        "smaller than a millimetre"},
+      {"no forms, thinner than any scanner's", [&] { Set<int32_t>(252, 0), Set<float>(88, 0.001f); },
+       "x 0.001 mm, and no scan of bones"},
+      {"no forms, wider than bones", [&] { Set<int32_t>(252, 0), Set<float>(84, 51); }, "x 51 x "},
       {"no forms, longer than any scanner", [&] { Set<int32_t>(252, 0), Set<float>(80, 300); },
        "longer than three metres"},
       {"beyond all measure", [&] { Set<float>(292, 3e38f); }, "a kilometre away"},

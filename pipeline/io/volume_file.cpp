@@ -9,6 +9,7 @@
 #include "core/errors.h"
 #include "core/text/extension.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/dicom/dicom_files.h"
 #include "pipeline/io/dicom/dicom_segments.h"
 #include "pipeline/io/dicom/dicom_series.h"
 #include "pipeline/io/itk_image.h"
@@ -104,14 +105,13 @@ void Write(const std::filesystem::path& named, const Grid& grid, ScalarType type
 
 // As it is stored, "not a number" among its values.
 Scan ReadStored(const std::filesystem::path& path) {
-  if (HoldsDicom(path)) return ReadDicomSeries(path);
+  if (HoldsDicom(path)) return ReadDicomSeries(ReadDicomHeaders(path));
   const FileFormat format = RequireReadable(path);
   return format == FileFormat::kNifti ? ReadNifti(path) : ReadItkScan(format, path);
 }
 
-// Of a file whose voxels are the labels.
-LabelMap ReadNumbers(const std::filesystem::path& path) {
-  Scan scan = ReadStored(path);
+// Of voxels that are the labels.
+LabelMap NumbersOf(Scan scan) {
   FillUnmeasured(scan.volume.values, 0);
   LabelMap labels(scan.volume.grid);
   for (size_t v = 0; v < labels.values.size(); ++v) {
@@ -148,7 +148,7 @@ Scan ReadScan(const std::filesystem::path& path) {
 }
 
 VolumeInfo ReadVolumeInfo(const std::filesystem::path& path) {
-  if (HoldsDicom(path)) return ReadDicomSeriesInfo(path);
+  if (HoldsDicom(path)) return ReadDicomSeriesInfo(ReadDicomHeaders(path));
   const FileFormat format = RequireReadable(path);
   if (format == FileFormat::kNifti) return ReadNiftiInfo(path);
   const ItkHeader header = ReadItkHeader(format, path);
@@ -156,18 +156,18 @@ VolumeInfo ReadVolumeInfo(const std::filesystem::path& path) {
 }
 
 Grid ReadLabelsGrid(const std::filesystem::path& path) {
-  if (HoldsDicom(path)) {
-    if (const auto grid = FindDicomSegmentsGrid(path)) return *grid;
-  }
-  return IsLayered(path) ? SegmentLayersGrid(path) : ReadVolumeInfo(path).grid;
+  if (!HoldsDicom(path)) return IsLayered(path) ? SegmentLayersGrid(path) : ReadVolumeInfo(path).grid;
+  std::vector<DicomFile> headers = ReadDicomHeaders(path);
+  if (const auto grid = FindDicomSegmentsGrid(headers)) return *grid;
+  return ReadDicomSeriesInfo(std::move(headers)).grid;
 }
 
 LayeredLabels ReadLayeredLabels(const std::filesystem::path& path) {
   if (IsLayered(path)) return ReadSegmentLayers(path);
-  if (HoldsDicom(path)) {
-    if (auto segments = FindDicomSegments(path)) return *std::move(segments);
-  }
-  return {ReadNumbers(path), {}};
+  if (!HoldsDicom(path)) return {NumbersOf(ReadStored(path)), {}};
+  std::vector<DicomFile> headers = ReadDicomHeaders(path);
+  if (auto segments = FindDicomSegments(headers)) return *std::move(segments);
+  return {NumbersOf(ReadDicomSeries(std::move(headers))), {}};
 }
 
 LabelMap ReadLabels(const std::filesystem::path& path) { return ReadLayeredLabels(path).labels; }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <set>
 
@@ -35,16 +36,6 @@ size_t Images(const std::vector<DicomFile>& series) {
 
 bool Holds(const std::vector<DicomFile>& files, DicomContent content) {
   return std::ranges::any_of(files, [=](const DicomFile& file) { return file.content == content; });
-}
-
-std::vector<DicomFile> AllFiles(const std::filesystem::path& path) {
-  std::vector<DicomFile> files;
-  const bool folder = std::filesystem::is_directory(path);
-  for (const std::filesystem::path& file :
-       folder ? SeriesFiles(path) : std::vector<std::filesystem::path>{path}) {
-    if (auto header = ReadDicomHeader(file)) files.push_back(*std::move(header));
-  }
-  return files;
 }
 
 std::vector<DicomFile> OfBodies(std::vector<DicomFile> files) {
@@ -143,22 +134,33 @@ void RequireOneVolume(const std::vector<DicomFile>& series) {
 
 }  // namespace
 
-std::vector<DicomFile> ScanFiles(const std::filesystem::path& path) {
-  std::vector<DicomFile> series = WithoutCopies(TheSeries(OfBodies(AllFiles(path))));
+std::vector<DicomFile> ReadDicomHeaders(const std::filesystem::path& path) {
+  std::vector<DicomFile> files;
+  const bool folder = std::filesystem::is_directory(path);
+  for (const std::filesystem::path& file :
+       folder ? SeriesFiles(path) : std::vector<std::filesystem::path>{path}) {
+    if (auto header = ReadDicomHeader(file)) files.push_back(*std::move(header));
+  }
+  return files;
+}
+
+std::vector<DicomFile> ScanFiles(std::vector<DicomFile> all) {
+  std::vector<DicomFile> series = WithoutCopies(TheSeries(OfBodies(std::move(all))));
   RequirePlaces(series);
   RequireOneVolume(series);
   return series;
 }
 
-std::vector<DicomFile> SegmentationFiles(const std::filesystem::path& path) {
-  std::vector<DicomFile> files = AllFiles(path);
-  std::erase_if(files, [](const DicomFile& file) { return file.content != DicomContent::kSegments; });
-  std::set<std::string> all;
-  for (const DicomFile& file : files) all.insert(file.series);
-  if (all.size() > 1) {
+std::vector<DicomFile> SegmentationFiles(const std::vector<DicomFile>& all) {
+  std::vector<DicomFile> files;
+  std::ranges::copy_if(all, std::back_inserter(files),
+                       [](const DicomFile& file) { return file.content == DicomContent::kSegments; });
+  std::set<std::string> series;
+  for (const DicomFile& file : files) series.insert(file.series);
+  if (series.size() > 1) {
     throw InputError(
         "the folder holds " +
-        Count(all.size(), "DICOM segmentations (SEG); put the one you mean in a folder of its own"));
+        Count(series.size(), "DICOM segmentations (SEG); put the one you mean in a folder of its own"));
   }
   files = WithoutCopies(std::move(files));
   RequirePlaces(files);

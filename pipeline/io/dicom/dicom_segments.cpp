@@ -43,8 +43,8 @@ void Enter(const std::vector<uint16_t>& stored, const DicomSlice& slice, const D
 
 }  // namespace
 
-std::optional<LayeredLabels> FindDicomSegments(const std::filesystem::path& path) {
-  const std::vector<DicomFile> files = SegmentationFiles(path);
+std::optional<LayeredLabels> FindDicomSegments(const std::vector<DicomFile>& headers) {
+  const std::vector<DicomFile> files = SegmentationFiles(headers);
   if (files.empty()) return std::nullopt;
   const DicomSlices placed = PlaceSegments(files);
   LayeredLabels out{LabelMap(WholeGrid(files, placed)), {}};
@@ -56,8 +56,8 @@ std::optional<LayeredLabels> FindDicomSegments(const std::filesystem::path& path
   return out;
 }
 
-std::optional<Grid> FindDicomSegmentsGrid(const std::filesystem::path& path) {
-  const std::vector<DicomFile> files = SegmentationFiles(path);
+std::optional<Grid> FindDicomSegmentsGrid(const std::vector<DicomFile>& headers) {
+  const std::vector<DicomFile> files = SegmentationFiles(headers);
   if (files.empty()) return std::nullopt;
   return WholeGrid(files, PlaceSegments(files));
 }

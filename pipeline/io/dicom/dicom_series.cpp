@@ -21,8 +21,8 @@ struct Series {
   DicomSlices placed;
 };
 
-Series OpenSeries(const std::filesystem::path& path) {
-  Series series{ScanFiles(path), {}};
+Series SeriesOf(std::vector<DicomFile> headers) {
+  Series series{ScanFiles(std::move(headers)), {}};
   series.placed = PlaceScan(series.files);
   return series;
 }
@@ -89,8 +89,8 @@ std::vector<std::vector<size_t>> PlacesOf(const Series& series) {
 
 }  // namespace
 
-Scan ReadDicomSeries(const std::filesystem::path& path) {
-  const Series series = OpenSeries(path);
+Scan ReadDicomSeries(std::vector<DicomFile> headers) {
+  const Series series = SeriesOf(std::move(headers));
   const ItkPlanes first = PlanesOf(series.files.front(), false);
   Scan scan;
   scan.volume = Volume(WholeGrid(series, first));
@@ -107,8 +107,8 @@ Scan ReadDicomSeries(const std::filesystem::path& path) {
   return scan;
 }
 
-VolumeInfo ReadDicomSeriesInfo(const std::filesystem::path& path) {
-  const Series series = OpenSeries(path);
+VolumeInfo ReadDicomSeriesInfo(std::vector<DicomFile> headers) {
+  const Series series = SeriesOf(std::move(headers));
   const ItkPlanes first = PlanesOf(series.files.front(), false);
   return {WholeGrid(series, first), TypeOf(series.files.front(), first), series.files.front().modality};
 }

@@ -7,6 +7,8 @@
 #include <fstream>
 
 #include "core/errors.h"
+#include "pipeline/io/dicom/dicom_files.h"
+#include "pipeline/io/dicom/dicom_segments.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/dicom_bytes.h"
 #include "tests/support/dicom_segmentation.h"
@@ -311,6 +313,19 @@ TEST(DicomSeries, AnImageWhoseFramesAreRescaledDifferentlyIsRefused) {
   };
   EXPECT_THAT(complaint("2"), HasSubstr("rescaled differently"));
   EXPECT_THAT(complaint("1"), testing::Not(HasSubstr("rescaled differently")));
+}
+
+// Of hundreds of slices on a network's disk each header is read once, not for a segmentation and again.
+TEST(DicomSeries, SlicesThatAreALabelMapAreLookedAtOnce) {
+  const ScratchFolder folder;
+  for (int slice = 0; slice < 3; ++slice)
+    WriteCtSlice(folder.path() / (std::to_string(slice) + ".dcm"), slice, "1");
+  EXPECT_EQ(ReadLabelsGrid(folder.path()).size, Eigen::Vector3i(2, 2, 3));
+  const std::vector<DicomFile> headers = ReadDicomHeaders(folder.path());
+  ASSERT_EQ(headers.size(), 3u);
+  for (const DicomFile& file : headers) std::filesystem::resize_file(file.path, 0);
+  EXPECT_FALSE(FindDicomSegmentsGrid(headers)) << "without another look at them";
+  EXPECT_EQ(ScanFiles(headers).size(), 3u);
 }
 
 TEST(DicomSeries, WhatIsNotOfTheBodyBesideAScanDoesNotCount) {

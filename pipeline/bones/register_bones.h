@@ -10,7 +10,7 @@ namespace kvx {
 
 struct RegisterBones {
   static constexpr std::string_view kName = "register_bones";
-  static constexpr int kVersion = 21;
+  static constexpr int kVersion = 22;
   struct Inputs {
     BoneTemplate& shown;  // weights are not asked for
     const Artifact<Scan>& scan;

@@ -113,7 +113,7 @@ std::vector<Eigen::Vector3f> PoseEquilibrium::At(PoseVector pose) const {
   ParallelEach(nodes_.size(), [&](size_t n) {
     mm[nodes_[n].index] = Apply(blend(nodes_[n].weights), nodes_[n].template_mm).cast<float>();
   });
-  tissue_.Relax({}, mm);
+  tissue_.Relax({}, {}, mm);
   ParallelEach(nodes_.size(), [&](size_t n) {
     const Eigen::Vector3d at_rest_mm = mm[nodes_[n].index].cast<double>();
     const Eigen::Vector3d d = ApplyInverse(blend(nodes_[n].weights), at_rest_mm) - nodes_[n].template_mm;

@@ -108,14 +108,15 @@ Volume FinerByWhatWasMeasured(const Volume& scan, const Eigen::Vector3i& times) 
   return out;
 }
 
-DisplacementField Unfolded(const DisplacementField& scan_from_template, const RegistrationInputs& given) {
+DisplacementField Unfolded(const DisplacementField& scan_from_template, const RegistrationInputs& given,
+                           const Progress& progress) {
   const WorkRegion region = RegionAround(*given.body);
   std::vector<Eigen::Vector3f> scan_mm(region.grid.VoxelCount());
   ParallelEach(scan_mm.size(), [&](size_t v) {
     const PointVox p{(region.grid.Ijk(v) + region.first).cast<double>()};
     scan_mm[v] = (scan_from_template.grid.ToMm(p).lps + SampleTrilinear(scan_from_template, p)).cast<float>();
   });
-  Unfold(given.bones->labels, *given.body, region, scan_mm);
+  Unfold(given.bones->labels, *given.body, region, progress, scan_mm);
   return OnTemplate(*given.weights, PoseOf(*given.fits), region, scan_mm);
 }
 
@@ -158,12 +159,12 @@ WeightMap FinerWeights(const WeightMap& weights, const Eigen::Vector3i& times) {
 }
 
 RegisteredScan AtTemplateVoxels(const RegisteredScan& finer, const RegistrationInputs& given,
-                                const Eigen::Vector3i& times) {
+                                const Eigen::Vector3i& times, const Progress& progress) {
   const Mask& body = *given.body;
   RegisteredScan out;
   out.control_points = finer.control_points;
   out.control_points_per_level = finer.control_points_per_level;
-  out.scan_from_template = Unfolded(EveryVoxelOf(finer.scan_from_template, times).Taken(), given);
+  out.scan_from_template = Unfolded(EveryVoxelOf(finer.scan_from_template, times).Taken(), given, progress);
   out.folded_fraction = FoldedFraction(out.scan_from_template, body);
   out.place_error_steps = EveryVoxelOf(finer.place_error_steps, times).Taken();
   out.confidence = Summarise(out.place_error_steps, body);

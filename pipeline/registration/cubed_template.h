@@ -1,6 +1,7 @@
 // A template of thick slices, between its slices. Blocks, lattices and margins of the registration count
 // voxels, and are as wide as they are long only where voxels are nearly cubes.
 #pragma once
+#include "core/host/progress.h"
 #include "core/registered_scan.h"
 #include "pipeline/registration/region/registration_inputs.h"
 
@@ -28,6 +29,6 @@ WeightMap FinerWeights(const WeightMap& weights, const Eigen::Vector3i& times);
 // What was found on the finer grid, at the voxels of the template that `given` has. Slopes over whole voxels
 // may show folds that narrower ones do not: they are relaxed away.
 RegisteredScan AtTemplateVoxels(const RegisteredScan& finer, const RegistrationInputs& given,
-                                const Eigen::Vector3i& times);
+                                const Eigen::Vector3i& times, const Progress& progress);
 
 }  // namespace kvx

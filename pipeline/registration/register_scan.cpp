@@ -84,12 +84,12 @@ RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen:
   const ElasticTissue tissue(bones, *inputs.body, beyond_coat_mm, region, context.backend);
   std::vector<Eigen::Vector3f> scan_mm;
   std::optional<LevelBuilder> builder;
-  SideBySide([&] { scan_mm = ElasticStart(*inputs.weights, tissue, pose, region); },
+  SideBySide([&] { scan_mm = ElasticStart(*inputs.weights, tissue, pose, region, context.progress); },
              [&] { builder.emplace(inputs, times, beyond_coat_mm, region, context.backend); });
   RegisteredScan out;
   LeftOpen left_open;
   for (int round = 0; round < kRounds; ++round) {
-    Unfold(bones, *inputs.body, region, scan_mm);
+    Unfold(bones, *inputs.body, region, context.progress, scan_mm);
     std::vector<BlockLevel> levels = builder->Build(scan_mm);
     const bool last = round + 1 == kRounds;
     std::vector<float> weights;  // before outliers count less
@@ -107,9 +107,9 @@ RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen:
     const std::vector<Eigen::Matrix3f> holds = Holds(levels.front(), scan_mm);
     levels.clear();  // the tissue needs the room
     field = std::vector<FieldVector>();
-    tissue.Relax(holds, scan_mm);
+    tissue.Relax(holds, context.progress, scan_mm);
   }
-  Unfold(bones, *inputs.body, region, scan_mm);
+  Unfold(bones, *inputs.body, region, context.progress, scan_mm);
   out.scan_from_template = OnTemplate(*inputs.weights, pose, region, scan_mm);
   out.folded_fraction = FoldedFraction(out.scan_from_template, *inputs.body);
   out.place_error_steps = PlaceErrorSteps(inputs, builder->images(), region, left_open, scan_mm);
@@ -133,7 +133,8 @@ RegisteredScan RegisterScan::Run(const Inputs& given, const Options& options, St
   const Eigen::Vector3i times = TimesTowardsCubes(inputs.body->grid);
   if ((times.array() == 1).all()) return RegisterAdaptively(inputs, times, context);
   const CubedTemplate cubed(inputs, times);
-  return AtTemplateVoxels(RegisterAdaptively(cubed.Inputs(), times, context), inputs, times);
+  return AtTemplateVoxels(RegisterAdaptively(cubed.Inputs(), times, context), inputs, times,
+                          context.progress);
 }
 
 }  // namespace kvx

@@ -2,14 +2,17 @@
 #include "pipeline/bones/refine/pose_hint.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 
 #include "core/local_motion.h"
+#include "core/voxels/to_corner.h"
 #include "pipeline/bones/template/bone_shape.h"
 
 namespace kvx {
 namespace {
 
 constexpr double kReachOfThickness = 0.5;
+constexpr double kFarthest = 1.5;             // of the way across all bones
 constexpr double kHintRad = RadFromDeg(5);    // as well as bones are aligned by eye
 constexpr double kHintOfThickness = 1.0 / 6;  // the reach is three standard deviations
 
@@ -21,7 +24,29 @@ Twist6Covariance CovarianceOfHint(const Bone& bone) {
   return out;
 }
 
+// Across all bones of the template, from corner to corner.
+double AcrossMm(const BoneSet& bones) {
+  Eigen::AlignedBox3d all;
+  for (const Bone& bone : bones.bones) {
+    for (int n = 0; n < 8; ++n) {
+      const Eigen::Vector3d part = ToCorner(n).cast<double>() - Eigen::Vector3d(0, 0.5, 0.5);
+      all.extend(bone.box.origin.lps + bone.box.axes * part.cwiseProduct(bone.box.extent_mm));
+    }
+  }
+  return all.diagonal().norm();
+}
+
+double BeyondMm(const PointMm& place, const Grid& grid) {
+  const Eigen::Vector3d vox = grid.ToVox(place).ijk, last = (grid.size.array() - 1).cast<double>();
+  const PointVox nearest{vox.cwiseMax(Eigen::Vector3d::Zero()).cwiseMin(last)};
+  return (grid.ToMm(nearest).lps - place.lps).norm();
+}
+
 }  // namespace
+
+bool MayBeMeant(const BoneSet& bones, const RigidTransform& hint, int bone, const Grid& scan) {
+  return BeyondMm(hint * bones.bones[size_t(bone)].centroid, scan) <= kFarthest * AcrossMm(bones);
+}
 
 bool IsNearHint(const Bone& bone, const RigidTransform& hint, const RigidTransform& pose) {
   return PoseDistanceMm(bone, hint, pose) < kReachOfThickness * bone.box.extent_mm.minCoeff();

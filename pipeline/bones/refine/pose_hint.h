@@ -11,6 +11,10 @@ namespace kvx {
 
 using PoseHints = std::map<std::string, RigidTransform>;  // scan_from_template by bone name
 
+// Whether a scan on this grid can show bones that hang together with one there: it lies no farther beyond the
+// grid than half as far again as the template's bones reach, as those of a fist do when it opens.
+bool MayBeMeant(const BoneSet& bones, const RigidTransform& hint, int bone, const Grid& scan);
+
 // Whether `pose` is what the hint means: within half of the bone's thickness, as PoseDistanceMm has it. A
 // turn of a round bone about its length hardly counts there, as it hardly shows.
 bool IsNearHint(const Bone& bone, const RigidTransform& hint, const RigidTransform& pose);

@@ -64,7 +64,10 @@ BoneSearch::BoneSearch(const SoughtBones& sought, const Volume& scan, Backend& b
       scores_(backend),
       progress_(progress.Silent()) {
   for (const Volume& level : scan_levels_) device_levels_.emplace_back(backend, level);
-  for (const auto& [name, pose] : hints) hints_[bones().IndexOf(name)] = pose;
+  for (const auto& [name, pose] : hints) {
+    const int bone = bones().IndexOf(name);
+    if (MayBeMeant(bones(), pose, bone, scan.grid)) hints_[bone] = pose;
+  }
 }
 
 BoneSearch BoneSearch::TryingAlso(std::map<int, RigidTransform> places) const {

@@ -66,7 +66,7 @@ class BoneSearch {
   const BoneSet& bones() const { return sought_.bones(); }
   const Anatomy& anatomy() const { return sought_.anatomy(); }
   const std::vector<double>& independent_samples() const { return sought_.independent_samples(); }
-  const RigidTransform* HintOf(int bone) const;  // nullptr where none was given
+  const RigidTransform* HintOf(int bone) const;  // nullptr where none was given that may be meant
   // At the level at which a bone is looked for first.
   const DeviceScan& DeviceLevelOf(int bone) const { return device_levels_[sought_.FirstLevelOf(bone)]; }
   const BoneScores& scores() const { return scores_; }

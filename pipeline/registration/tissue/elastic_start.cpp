@@ -23,9 +23,10 @@ std::vector<Eigen::Vector3f> Skinned(const WeightMap& weights, const PoseVector&
 }  // namespace
 
 std::vector<Eigen::Vector3f> ElasticStart(const WeightMap& weights, const ElasticTissue& tissue,
-                                          const PoseVector& scan_from_template, const WorkRegion& region) {
+                                          const PoseVector& scan_from_template, const WorkRegion& region,
+                                          const Progress& progress) {
   std::vector<Eigen::Vector3f> scan_mm = Skinned(weights, scan_from_template, region);
-  tissue.Relax({}, scan_mm);
+  tissue.Relax({}, progress, scan_mm);
   return scan_mm;
 }
 

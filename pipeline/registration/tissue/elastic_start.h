@@ -10,6 +10,7 @@ namespace kvx {
 // goes with the tissue nearest to it. Linear blending loses volume and folds where joints bend strongly;
 // tissue does neither.
 std::vector<Eigen::Vector3f> ElasticStart(const WeightMap& weights, const ElasticTissue& tissue,
-                                          const PoseVector& scan_from_template, const WorkRegion& region);
+                                          const PoseVector& scan_from_template, const WorkRegion& region,
+                                          const Progress& progress);
 
 }  // namespace kvx

@@ -95,7 +95,7 @@ ElasticTissue::ElasticTissue(const LabelMap& bone_labels, const Mask& body, cons
       beside_bones_.push_back(uint32_t(v));
 }
 
-void ElasticTissue::Relax(std::span<const Eigen::Matrix3f> holds,
+void ElasticTissue::Relax(std::span<const Eigen::Matrix3f> holds, const Progress& progress,
                           std::vector<Eigen::Vector3f>& scan_mm) const {
   const std::vector<Eigen::Vector3f> before = scan_mm;
   for (const auto& [step, sweeps] : CoarseToFine(grid_)) {
@@ -107,7 +107,7 @@ void ElasticTissue::Relax(std::span<const Eigen::Matrix3f> holds,
       held_mm = Subsampled(before, step).positions_mm;
       lattice.holds = node_holds, lattice.held_mm = held_mm;
     }
-    RelaxInContact(sweeps_, contact_, step, sweeps, lattice);
+    RelaxInContact(sweeps_, contact_, step, sweeps, progress, lattice);
     AddMoved(lattice, step, scan_mm);
   }
   RelaxBesideBones(holds, before, scan_mm);

@@ -1,6 +1,7 @@
 // The tissue of a region as an elastic solid between its bones.
 #pragma once
 #include "core/bone.h"
+#include "core/host/progress.h"
 #include "pipeline/registration/region/work_region.h"
 #include "pipeline/registration/tissue/tissue_contact.h"
 
@@ -15,8 +16,10 @@ class ElasticTissue {
   // Moves every soft voxel (given in scan mm) towards where the tissue is at ease, and out of other tissue
   // that it would lie in. Bones stay; air moves with the tissue nearest to it. `holds`: empty, or per cell of
   // 2 x 2 x 2 voxels how firmly each of its voxels is held where it is (1/mm^2: second derivative of its
-  // energy in its place), in units of the tissue's own stiffness.
-  void Relax(std::span<const Eigen::Matrix3f> holds, std::vector<Eigen::Vector3f>& scan_mm) const;
+  // energy in its place), in units of the tissue's own stiffness. Of `progress` it asks alone whether to go
+  // on.
+  void Relax(std::span<const Eigen::Matrix3f> holds, const Progress& progress,
+             std::vector<Eigen::Vector3f>& scan_mm) const;
 
  private:
   ElasticLattice Empty(int step) const;

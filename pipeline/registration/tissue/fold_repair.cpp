@@ -2,6 +2,7 @@
 // mostly between bones that nearly touch, is opened voxel by voxel.
 #include "pipeline/registration/tissue/fold_repair.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -150,15 +151,45 @@ void Open(const Stencil& stencil, double bone_share, ElasticLattice& lattice) {
 }
 
 // Opens the folded voxels one after the other; those that this folds come next.
-void OpenAll(const Mask& body, const WorkRegion& region, std::vector<uint32_t> folded,
+void OpenAll(const Mask& body, const WorkRegion& region, const Progress& silent, std::vector<uint32_t> folded,
              ElasticLattice& lattice) {
   for (const auto& [rounds, bone_share] : kOpenings) {
     for (int round = 0; round < rounds && !folded.empty(); ++round) {
+      silent.Report("", 0);
       for (const uint32_t v : folded)
         Open(StencilOf(region, body.grid, region.grid.Ijk(v)), bone_share, lattice);
       folded = Folded(Around(folded, 2, region.grid), lattice.positions_mm, body, region);
     }
   }
+}
+
+// Where tissue may go: a box's width beyond all of it, where nothing goes that is not torn past mending.
+// There what is folded pushes its neighbours ever farther, to where no number reaches.
+class Room {
+ public:
+  explicit Room(const std::vector<Eigen::Vector3f>& mm) {
+    for (const Eigen::Vector3f& place : mm) box_.extend(place);
+    const Eigen::Vector3f wide = box_.sizes();
+    box_.min() -= wide, box_.max() += wide;
+  }
+  bool Has(const Eigen::Vector3f& mm) const { return box_.contains(mm); }
+
+ private:
+  Eigen::AlignedBox3f box_;
+};
+
+// False, and all as it was, where a node would leave the room.
+bool RelaxWithin(const Room& room, std::span<const uint32_t> nodes, const Progress& silent,
+                 ElasticLattice& lattice) {
+  std::vector<Eigen::Vector3f> before_mm;
+  for (const uint32_t n : nodes) before_mm.push_back(lattice.positions_mm[n]);
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    silent.Report("", 0);
+    reference::Relax(lattice, 1, nodes);
+  }
+  if (std::ranges::all_of(nodes, [&](uint32_t n) { return room.Has(lattice.positions_mm[n]); })) return true;
+  for (size_t n = 0; n < nodes.size(); ++n) lattice.positions_mm[nodes[n]] = before_mm[n];
+  return false;
 }
 
 }  // namespace
@@ -169,21 +200,26 @@ double Determinant(const std::vector<Eigen::Vector3f>& scan_mm, const WorkRegion
          (region.grid.direction.determinant() < 0 ? -1 : 1);
 }
 
-void Unfold(const LabelMap& bone_labels, const Mask& body, const WorkRegion& region,
+void Unfold(const LabelMap& bone_labels, const Mask& body, const WorkRegion& region, const Progress& progress,
             std::vector<Eigen::Vector3f>& scan_mm) {
   std::vector<uint32_t> folded = AllFolded(scan_mm, body, region);
   if (folded.empty()) return;
   ElasticLattice lattice = LatticeOf(bone_labels, body, region);
+  const Progress silent = progress.Silent();
+  const Room room(scan_mm);
   lattice.positions_mm = std::move(scan_mm);
   lattice.volume_stiffness = kVolumeStiffness;
   lattice.air_stiffness = 1;  // the skin is folded as soon as the air beside it is
   for (int round = 0; round < kRounds && !folded.empty(); ++round) {
     const int reach = std::min(3, 1 + round / 4);
     if (round % 4 == 3) lattice.volume_stiffness *= 2;
-    reference::Relax(lattice, kSweeps, Around(folded, reach, region.grid));
+    if (!RelaxWithin(room, Around(folded, reach, region.grid), silent, lattice)) {
+      folded.clear();
+      break;
+    }
     folded = Folded(Around(folded, reach + 1, region.grid), lattice.positions_mm, body, region);
   }
-  OpenAll(body, region, std::move(folded), lattice);
+  OpenAll(body, region, silent, std::move(folded), lattice);
   scan_mm = std::move(lattice.positions_mm);
 }
 

@@ -1,5 +1,6 @@
 // The last resort against folds: where a map does not keep its orientation, the tissue around is relaxed.
 #pragma once
+#include "core/host/progress.h"
 #include "core/image.h"
 #include "pipeline/registration/region/work_region.h"
 
@@ -10,9 +11,10 @@ namespace kvx {
 double Determinant(const std::vector<Eigen::Vector3f>& scan_mm, const WorkRegion& region,
                    const Grid& template_grid, const Eigen::Vector3i& voxel);
 
-// Moves tissue until no voxel of the body is folded. Bone moves only where two bones lie one inside the
-// other, so that no tissue could part them.
-void Unfold(const LabelMap& bone_labels, const Mask& body, const WorkRegion& region,
+// Moves tissue until no voxel of the body is folded, or gives up where it is torn too far: folds stay then.
+// Bone moves only where two bones lie one inside the other, so that no tissue could part them. Of `progress`
+// it asks alone whether to go on.
+void Unfold(const LabelMap& bone_labels, const Mask& body, const WorkRegion& region, const Progress& progress,
             std::vector<Eigen::Vector3f>& scan_mm);
 
 }  // namespace kvx

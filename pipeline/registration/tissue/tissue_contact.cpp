@@ -33,7 +33,7 @@ class Cells {
   explicit Cells(const ElasticLattice& lattice) : lattice_(lattice), width_mm_(MeanSpacing(lattice)) {
     const auto [low, high] = ParallelSum<Bounds>(lattice.kinds.size(), [&](Bounds& so_far, size_t n) {
       const Vector3f& mm = lattice.positions_mm[n];
-      if (lattice.kinds[n] != NodeKind::kAbsent) so_far += {mm, mm};
+      if (lattice.kinds[n] != NodeKind::kAbsent) so_far += mm.allFinite() ? Bounds{mm, mm} : Bounds::All();
     });
     if (!(low.array() <= high.array()).all()) return;      // no tissue
     low_mm_ = low - Vector3f::Constant(1.5f * width_mm_);  // every node has cells around its own
@@ -66,6 +66,7 @@ class Cells {
  private:
   struct Bounds {
     Vector3f low = Vector3f::Constant(std::numeric_limits<float>::max()), high = -low;
+    static Bounds All() { return {Bounds().high, Bounds().low}; }
     Bounds& operator+=(const Bounds& other) {
       low = low.cwiseMin(other.low), high = high.cwiseMax(other.high);
       return *this;
@@ -233,7 +234,9 @@ std::vector<ContactPush> TissueContact::Find(const ElasticLattice& lattice, int 
 }
 
 void RelaxInContact(const ElasticSweeps& relax, const TissueContact& contact, int step, int sweeps,
-                    ElasticLattice& lattice) {
+                    const Progress& progress, ElasticLattice& lattice) {
+  const Progress silent = progress.Silent();
+  silent.Report("", 0);
   const auto prepared = relax.Prepare(lattice);
   std::vector<ContactPush> pushes = contact.Find(lattice, step);
   if (pushes.empty()) {
@@ -246,6 +249,7 @@ void RelaxInContact(const ElasticSweeps& relax, const TissueContact& contact, in
   const int hold_nodes = lattice.hold_nodes;
   Held held(lattice);
   for (int round = 0; round < kRounds && !pushes.empty(); ++round) {
+    silent.Report("", 0);
     held.Push(lattice, pushes);
     lattice.holds = held.holds(), lattice.held_mm = held.mm(), lattice.hold_nodes = 1;
     relax(*prepared, lattice, std::max(1, 2 * sweeps / kRounds));

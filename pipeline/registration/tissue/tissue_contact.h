@@ -1,5 +1,6 @@
 // Tissue that would share space with other tissue, as behind a bent knee or in a fist: where it should go.
 #pragma once
+#include "core/host/progress.h"
 #include "core/image.h"
 #include "kernels/elastic_sweeps.h"
 
@@ -29,8 +30,8 @@ class TissueContact {
 };
 
 // `sweeps` of `relax`; where tissue overlaps, twice as many more, with the nodes concerned held where both
-// sides would just touch.
+// sides would just touch. Of `progress` it asks alone whether to go on.
 void RelaxInContact(const ElasticSweeps& relax, const TissueContact& contact, int step, int sweeps,
-                    ElasticLattice& lattice);
+                    const Progress& progress, ElasticLattice& lattice);
 
 }  // namespace kvx

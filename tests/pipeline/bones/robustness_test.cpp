@@ -201,6 +201,23 @@ TEST(RobustBones, ABoneOutOfViewLiesWhereItsInitialPoseHasIt) {
   EXPECT_TRUE(fits[3].Doubtful());
 }
 
+// Tissue would be torn by as much, and the build be busy with it for long. Here the limit is some 100 mm.
+TEST(RobustBones, AnInitialPoseFarBeyondTheScanCountsForNothing) {
+  const PoseVector truth = Bent(RigidTransform{}, {5, 5, 20});
+  Grid cut = Box({44, 44, 34}, {1.3, 1.3, 1.3}, Eigen::Matrix3d::Identity());
+  cut.origin.lps.x() = -46;
+  cut.size.x() = 46;
+  const Volume scan = Painted(cut, kFinger, truth);
+  RigidTransform far = truth[3];
+  far.translation_mm += Eigen::Vector3d(300, -200, 100);
+  const BoneFits without = Finger().Register(scan),
+                 with_hint = Finger().Register(scan, {.initial_poses = {{"last", far}}});
+  for (size_t b = 0; b < without.size(); ++b) {
+    EXPECT_EQ(OffMm(with_hint[b], without[b].scan_from_template, b), 0) << kFinger[b].name;
+    EXPECT_EQ(with_hint[b].note, without[b].note);
+  }
+}
+
 // A bone that left its joint is not looked for where it went: flagged without help, right with a rough
 // initial pose.
 TEST(RobustBones, AnInitialPoseRescuesABone) {

@@ -108,5 +108,30 @@ TEST(PoseHint, WhoeverGaveOneIsNotToGiveOne) {
   EXPECT_EQ(fit.note, "the bone may be off");
 }
 
+// 100 mm across all bones: up to 150 mm beyond the scan, along whichever axis.
+TEST(PoseHint, MayNotBeMeantFarBeyondTheScan) {
+  BoneSet bones;
+  for (const double z : {0.0, 40.0}) {
+    Bone bone;
+    bone.centroid.lps = {24, 0, z + 20};
+    bone.box.origin.lps = {0, 0, z + 20};
+    bone.box.extent_mm = {48, 36, 40};
+    bones.bones.push_back(bone);
+  }
+  Grid scan;
+  scan.size = {11, 21, 31};
+  scan.spacing_mm = {1, 1, 2};
+  scan.origin.lps = {100, 200, 300};
+  const auto meant = [&](const Eigen::Vector3d& centre) {
+    return MayBeMeant(bones, {Eigen::Quaterniond::Identity(), centre - bones.bones[1].centroid.lps}, 1, scan);
+  };
+  EXPECT_TRUE(meant({105, 205, 330}));
+  for (const double beyond : {149.0, 151.0}) {
+    EXPECT_EQ(meant({110 + beyond, 205, 330}), beyond < 150);
+    EXPECT_EQ(meant({105, 200 - beyond, 330}), beyond < 150);
+    EXPECT_EQ(meant({100 - 0.6 * beyond, 205, 360 + 0.8 * beyond}), beyond < 150);
+  }
+}
+
 }  // namespace
 }  // namespace kvx

@@ -47,8 +47,20 @@ TEST(ElasticTissue, AtRestNothingMoves) {
   const World world;
   std::vector<Eigen::Vector3f> places = world.AtRest();
   const Volume beyond_coat_mm = world.BeyondCoatMm();
-  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region, SharedBackend()).Relax({}, places);
+  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region, SharedBackend()).Relax({}, {}, places);
   for (size_t v = 0; v < places.size(); ++v) ASSERT_LT((places[v] - world.AtRest()[v]).norm(), 1e-4);
+}
+
+TEST(ElasticTissue, StopsWhenItIsToldTo) {
+  const World world;
+  const Volume beyond_coat_mm = world.BeyondCoatMm();
+  const ElasticTissue tissue(world.bones, world.body, beyond_coat_mm, world.region, SharedBackend());
+  for (const int questions : {0, 1}) {  // one a lattice
+    int asked = 0;
+    std::vector<Eigen::Vector3f> places = world.Dented();
+    const Progress progress({}, [&] { return asked++ >= questions; });
+    EXPECT_THROW(tissue.Relax({}, progress, places), Cancelled);
+  }
 }
 
 TEST(ElasticTissue, ADentEvensOutUnlessItIsHeld) {
@@ -58,12 +70,12 @@ TEST(ElasticTissue, ADentEvensOutUnlessItIsHeld) {
   const size_t middle = world.At(14, 12, 12), bone = world.At(6, 12, 12);
   const std::vector<Eigen::Vector3f> rest = world.AtRest(), dented = world.Dented();
   std::vector<Eigen::Vector3f> loose = dented, held = dented, sliding = dented;
-  tissue.Relax({}, loose);
+  tissue.Relax({}, {}, loose);
   const size_t cells = Coarsened(world.region.grid, 2).VoxelCount();
-  tissue.Relax(std::vector<Eigen::Matrix3f>(cells, 1e4f * Eigen::Matrix3f::Identity()), held);
+  tissue.Relax(std::vector<Eigen::Matrix3f>(cells, 1e4f * Eigen::Matrix3f::Identity()), {}, held);
   // Held across the dent alone, as by an edge that lies along it: it evens out as if it were loose.
   const Eigen::Matrix3f across = Eigen::Vector3f(1e4f, 1e4f, 0).asDiagonal();
-  tissue.Relax(std::vector<Eigen::Matrix3f>(cells, across), sliding);
+  tissue.Relax(std::vector<Eigen::Matrix3f>(cells, across), {}, sliding);
   EXPECT_LT((loose[middle] - rest[middle]).norm(), 0.3f);
   EXPECT_LT((held[middle] - dented[middle]).norm(), 0.05f);
   EXPECT_LT((sliding[middle] - rest[middle]).norm(), 0.6f);
@@ -82,7 +94,7 @@ std::vector<double> ShearOfAGap(const Volume& beyond_coat_mm) {
     world.bones.values[v] = x < 9 || x >= 14;
     if (x >= 9) places[v].y() += 3;
   }
-  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region, SharedBackend()).Relax({}, places);
+  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region, SharedBackend()).Relax({}, {}, places);
   std::vector<double> out;
   for (int x = 9; x < 14; ++x) {
     const size_t v = world.At(x, 12, 12);
@@ -130,7 +142,7 @@ TEST(ElasticTissue, ALongBarStretchesEvenly) {
     if (p.x() >= 136) places.back().x() += 3;
   }
   const Volume far_mm(region.grid, 100.0f);
-  ElasticTissue(bones, body, far_mm, region, SharedBackend()).Relax({}, places);
+  ElasticTissue(bones, body, far_mm, region, SharedBackend()).Relax({}, {}, places);
   for (const int x : {88, 104, 120})
     EXPECT_NEAR(places[region.grid.Index(x, 12, 12)].x() - float(x), 3 * (x - 72) / 64.0, kNearlyMm) << x;
 }
@@ -140,7 +152,7 @@ TEST(ElasticTissue, AirGoesWithTheTissueNearestToIt) {
   std::vector<Eigen::Vector3f> places = world.Dented();
   const std::vector<Eigen::Vector3f> before = places;
   const Volume beyond_coat_mm = world.BeyondCoatMm();
-  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region, SharedBackend()).Relax({}, places);
+  ElasticTissue(world.bones, world.body, beyond_coat_mm, world.region, SharedBackend()).Relax({}, {}, places);
   const size_t skin = world.At(14, 12, 19), air = world.At(14, 12, 22);
   EXPECT_LT(((places[air] - before[air]) - (places[skin] - before[skin])).norm(), 1e-6f);
 }

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -61,6 +63,8 @@ TEST(TissueContact, TissueTornFarApartAndNoTissueMeetNothing) {
   TwoBlocks blocks;
   blocks.lattice.positions_mm[0] = {1e7f, -1e7f, 1e7f};
   EXPECT_TRUE(TissueContact(blocks.air).Find(blocks.lattice, 1).empty());
+  blocks.lattice.positions_mm[0].y() = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_TRUE(TissueContact(blocks.air).Find(blocks.lattice, 1).empty());
   blocks.lattice.kinds.assign(blocks.lattice.kinds.size(), NodeKind::kAbsent);
   EXPECT_TRUE(TissueContact(blocks.air).Find(blocks.lattice, 1).empty());
 }
@@ -111,7 +115,7 @@ TEST(TissueContact, RelaxedTissueHardlyOverlaps) {
   constexpr float kOverlapMm = 3;
   blocks.PushTogether(kOverlapMm);
   const TissueContact contact(blocks.air);
-  RelaxInContact(ElasticSweeps(testing_support::SharedBackend()), contact, 1, 40, blocks.lattice);
+  RelaxInContact(ElasticSweeps(testing_support::SharedBackend()), contact, 1, 40, {}, blocks.lattice);
   float low = 1e9f, high = -1e9f;  // the upper block's lowest and the lower one's highest node
   for (size_t v = 0; v < blocks.air.values.size(); ++v) {
     if (!blocks.Tissue(v) || !Inner(blocks, v)) continue;
@@ -130,7 +134,7 @@ TEST(TissueContact, WhatIsHeldElsewhereStaysAsFirmlyHeld) {
   const std::vector<Eigen::Matrix3f> holds(with.lattice.kinds.size(), 1e6f * Eigen::Matrix3f::Identity());
   const std::vector<Eigen::Vector3f> held = with.lattice.positions_mm;
   with.lattice.holds = holds, with.lattice.held_mm = held;
-  RelaxInContact(ElasticSweeps(testing_support::SharedBackend()), TissueContact(with.air), 1, 10,
+  RelaxInContact(ElasticSweeps(testing_support::SharedBackend()), TissueContact(with.air), 1, 10, {},
                  with.lattice);
   for (size_t v = 0; v < held.size(); ++v)
     EXPECT_LT((with.lattice.positions_mm[v] - without.lattice.positions_mm[v]).norm(), 1e-3f);

@@ -105,7 +105,7 @@ TEST(StandardHeader, EveryPackingIsReadThroughIt) {
 TEST(StandardHeader, LengthsAreInMillimetresWhateverTheFileHasThemIn) {
   const ScratchFolder folder;
   const std::string lps =
-      "space: left-posterior-superior\nspace directions: (10,0,0) (0,20,0) (0,0,30)\n"
+      "space: left-posterior-superior\nspace directions: (1,0,0) (0,2,0) (0,0,3)\n"
       "space origin: (50,60,70)\n";
   const auto grid_of = [&](const std::string& name, const std::string& bytes) {
     Put(folder.path() / name, bytes);
@@ -118,10 +118,10 @@ TEST(StandardHeader, LengthsAreInMillimetresWhateverTheFileHasThemIn) {
                                   std::pair("space units: \"um\" \"um\" \"um\"\n", 0.001),
                                   std::pair("space units: \"cm\" \"cm\" \"\"\n", 10.0)}) {
     if (mm < 0.01) {
-      EXPECT_THROW(nrrd(units), InputError) << "a tenth of a millimetre in all";
+      EXPECT_THROW(nrrd(units), InputError) << "a hundredth of a millimetre in all";
       continue;
     }
-    EXPECT_TRUE(nrrd(units).spacing_mm.isApprox(mm * Eigen::Vector3d(10, 20, 30))) << units;
+    EXPECT_TRUE(nrrd(units).spacing_mm.isApprox(mm * Eigen::Vector3d(1, 2, 3))) << units;
     EXPECT_TRUE(nrrd(units).origin.lps.isApprox(mm * Eigen::Vector3d(50, 60, 70))) << units;
   }
   EXPECT_THROW(nrrd("space units: \"mm\" \"um\" \"mm\"\n"), InputError);

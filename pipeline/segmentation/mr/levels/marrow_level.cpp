@@ -52,7 +52,8 @@ double PlaneAround(const std::vector<LevelSample>& samples, const PointMm& place
   squares = squares / weights - middle * middle.transpose();
   squares.diagonal().array() += kFlatMm * kFlatMm;
   const Eigen::Vector3d slope = squares.ldlt().solve(by_place / weights - mean * middle);
-  return mean - std::clamp(slope.dot(middle), -kMostChange * mean, kMostChange * mean);
+  const double most = kMostChange * std::abs(mean);
+  return mean - std::clamp(slope.dot(middle), -most, most);
 }
 
 double LevelAround(const std::vector<LevelSample>& samples, MarrowLevel::Fit fit, const PointMm& place) {

@@ -45,6 +45,13 @@ TEST(MarrowLevel, APlaneDoesNotGoOnForEver) {
   EXPECT_LT(plane.At(OnAxis(-300)), 1.7 * UnderCoil(kLengthMm / 2));
 }
 
+// As where strokes lie in a scan's noise about nothing.
+TEST(MarrowLevel, ABoneDarkerThanNothingHasNoBrightPlane) {
+  std::vector<LevelSample> samples = Shaft();
+  for (LevelSample& sample : samples) sample.intensity *= -1;
+  EXPECT_LT(MarrowLevel(samples, MarrowLevel::kPlane).At(OnAxis(40)), 0);
+}
+
 TEST(MarrowLevel, CortexIsNoPartOfIt) {
   std::vector<LevelSample> samples = Shaft();
   for (size_t n = 0; n < samples.size(); n += 5) samples[n].intensity *= 0.2;

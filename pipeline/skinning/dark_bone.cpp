@@ -1,8 +1,8 @@
-// Air that a ball reaches: an opening, by two distance maps.
+// Air that a ball reaches is an opening of all that is no body.
 #include "pipeline/skinning/dark_bone.h"
 
-#include "core/host/parallel.h"
-#include "core/voxels/distance_transform.h"
+#include "core/voxels/components.h"
+#include "core/voxels/dilated.h"
 
 namespace kvx {
 namespace {
@@ -16,13 +16,9 @@ Mask WithDarkBone(Mask body, const LabelMap& bones) {
   bool any = false;
   for (size_t v = 0; v < body.values.size() && !any; ++v) any = is_dark_bone(v);
   if (!any) return body;
-  Mask wide(body.grid);
-  const Volume to_body_mm = DistanceMapMm(body);
-  ParallelEach(wide.values.size(), [&](size_t v) { wide.values[v] = to_body_mm.values[v] > kBallMm; });
-  const Volume to_wide_mm = DistanceMapMm(wide);
-  ParallelEach(body.values.size(), [&](size_t v) {
-    if (is_dark_bone(v) && to_wide_mm.values[v] > kBallMm) body.values[v] = 1;
-  });
+  const Mask air = Dilated(Eroded(Complement(body), kBallMm), kBallMm);
+  for (size_t v = 0; v < body.values.size(); ++v)
+    if (is_dark_bone(v) && !air.values[v]) body.values[v] = 1;
   return body;
 }
 

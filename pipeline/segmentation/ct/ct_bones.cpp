@@ -88,9 +88,7 @@ class CtBone {
 
  private:
   bool Own(size_t v) const { return marks_.values[v] == bone_.label; }
-  bool OtherBone(size_t v) const {
-    return marks_.values[v] != 0 && marks_.values[v] != kBackgroundStroke && !Own(v);
-  }
+  bool OtherBone(size_t v) const { return IsOfBone(marks_.values[v]) && !Own(v); }
 
   template <class Is>
   Mask Where(Is&& is) const {

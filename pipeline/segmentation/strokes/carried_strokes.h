@@ -5,6 +5,7 @@
 namespace kvx {
 
 constexpr uint16_t kBackgroundStroke = 255;
+inline bool IsOfBone(uint16_t stroke) { return stroke != 0 && stroke != kBackgroundStroke; }
 
 // Each marked voxel is carried to the scan's voxel at its place. Throws InputError with what to do: no bone
 // is marked (nor the background, where that suffices: beside previous labels), what is given is a scan,

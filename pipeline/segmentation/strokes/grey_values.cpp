@@ -15,8 +15,6 @@ struct Beside {
   size_t itself = 0, others = 0;
 };
 
-bool IsOfBone(uint16_t value) { return value != 0 && value != kBackgroundStroke; }
-
 void Count(uint16_t one, uint16_t next, std::vector<Beside>& beside) {
   if (!IsOfBone(one) || !IsOfBone(next)) return;
   if (one == next) {

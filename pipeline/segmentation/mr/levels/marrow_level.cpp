@@ -79,6 +79,15 @@ Grid Lattice(const Grid& grid) {
 
 }  // namespace
 
+std::vector<LevelSample> SamplesOf(const Volume& scan, const Mask& where) {
+  std::vector<LevelSample> samples;
+  for (size_t v = 0; v < where.values.size(); ++v) {
+    if (!where.values[v]) continue;
+    samples.push_back({scan.grid.ToMm(PointVox{scan.grid.Ijk(v).cast<double>()}), scan.values[v]});
+  }
+  return samples;
+}
+
 MarrowLevel::MarrowLevel(std::vector<LevelSample> samples, Fit fit) : fit_(fit) {
   const std::vector<LevelSample> all = Thinned(samples);
   samples_ = all;

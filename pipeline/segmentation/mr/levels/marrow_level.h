@@ -14,6 +14,9 @@ struct LevelSample {
   double intensity = 0;
 };
 
+// Of the voxels of a mask on the scan's grid.
+std::vector<LevelSample> SamplesOf(const Volume& scan, const Mask& where);
+
 // From the bright samples around, near ones first. Dark samples (cortical bone) are told apart by themselves.
 // Where coils fade, samples lie on the bright side of a place at the end of a bone: a mean of them is too
 // bright there, a plane through them is not. What lies in a small bone says too little of a slope.

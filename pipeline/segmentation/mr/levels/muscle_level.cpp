@@ -26,17 +26,15 @@ constexpr double kDeviations = 6;     // of air's noise above air: tissue
 constexpr float kDimmest = 0.02;      // of marrow; darker is no signal, even of a scan without noise
 constexpr double kDarkest = 0.08;     // of marrow; there would be more noise in muscle than muscle
 
-bool IsBone(uint16_t stroke) { return stroke != 0 && stroke != kBackgroundStroke; }
+Mask OfBones(const LabelMap& strokes) {
+  Mask bones(strokes.grid);
+  for (size_t v = 0; v < bones.values.size(); ++v) bones.values[v] = IsOfBone(strokes.values[v]);
+  return bones;
+}
 
 // Read from the strokes of all bones: a coil's field is the same for all.
 MarrowLevel MarrowOf(const Volume& scan, const LabelMap& strokes) {
-  std::vector<LevelSample> samples;
-  for (size_t v = 0; v < strokes.values.size(); ++v) {
-    if (!IsBone(strokes.values[v])) continue;
-    const PointVox place{scan.grid.Ijk(v).cast<double>()};
-    samples.push_back({scan.grid.ToMm(place), scan.values[v]});
-  }
-  return MarrowLevel(std::move(samples));
+  return MarrowLevel(SamplesOf(scan, OfBones(strokes)));
 }
 
 // Of voxels in a box of the view.
@@ -84,9 +82,7 @@ double LeastTissue(const Volume& smooth) {
 }
 
 VoxelBox AroundBones(const LabelMap& strokes) {
-  Mask bones(strokes.grid);
-  for (size_t v = 0; v < bones.values.size(); ++v) bones.values[v] = IsBone(strokes.values[v]);
-  return GrownByMm(BoxOf(bones), kAroundMm, strokes.grid);
+  return GrownByMm(BoxOf(OfBones(strokes)), kAroundMm, strokes.grid);
 }
 
 // `relative`: intensities to marrow's.

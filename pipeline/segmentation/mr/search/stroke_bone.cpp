@@ -34,18 +34,6 @@ constexpr double kShellNats = 0.3;                       // of every voxel of th
 constexpr double kAboveCortex = 0.5, kDarkScale = 0.15;  // from the cortex' intensity to no cortex
 constexpr double kDarkNats = 1.0, kBrightNats = 1.5;     // for and against the shell
 
-Eigen::Vector3d PlaceMm(const Grid& grid, size_t v) {
-  return grid.ToMm(PointVox{grid.Ijk(v).cast<double>()}).lps;
-}
-
-std::vector<LevelSample> SamplesOf(const Volume& scan, const Mask& where) {
-  std::vector<LevelSample> samples;
-  for (size_t v = 0; v < where.values.size(); ++v) {
-    if (where.values[v]) samples.push_back({PointMm{PlaceMm(scan.grid, v)}, scan.values[v]});
-  }
-  return samples;
-}
-
 // What is so far from all that may be bone by its lean is none: nothing is looked for there.
 void CloseFarFrom(const Image<float>& lean, Image<Side>& sides) {
   constexpr double kFarMm = 8;

@@ -92,7 +92,7 @@ class Grower {
   }
 
   void FindInMr() {
-    MrBones found = FindMrBones(scan_, strokes_, boxes_, out_.labels, progress_);
+    MrBones found = FindMrBones(*WithUsualMuscle(scan_, strokes_), strokes_, boxes_, out_.labels, progress_);
     bones_ = std::move(found.bones);
     signs_ = std::move(found.signs);
     out_.doubts.insert(out_.doubts.end(), found.doubts.begin(), found.doubts.end());
@@ -183,17 +183,15 @@ class Grower {
 // way up from no signal.
 GrownBones GrowBones(const Volume& scan, const LabelMap& strokes, bool ct, const Progress& progress,
                      const LabelMap* previous) {
-  if (ct) return Grower(scan, strokes, true, progress, previous).Run();
   const Grid order = RightFrontUp(scan.grid);
-  if (order == scan.grid && ZeroLevelOf(scan) == 0)
-    return Grower(*WithUsualMuscle(scan, strokes), strokes, false, progress, previous).Run();
+  if (ct || (order == scan.grid && ZeroLevelOf(scan) == 0))
+    return Grower(scan, strokes, ct, progress, previous).Run();
   Volume from_zero = InOrderOf(order, scan);
   const float zero = float(ZeroLevelOf(from_zero));
   for (float& value : from_zero.values) value -= zero;
   const LabelMap marks = InOrderOf(order, strokes),
                  before = previous ? InOrderOf(order, *previous) : LabelMap();
-  GrownBones grown =
-      Grower(*WithUsualMuscle(from_zero, marks), marks, false, progress, previous ? &before : nullptr).Run();
+  GrownBones grown = Grower(from_zero, marks, false, progress, previous ? &before : nullptr).Run();
   grown.labels = InOrderOf(scan.grid, grown.labels);
   return grown;
 }

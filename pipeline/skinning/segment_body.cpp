@@ -3,6 +3,7 @@
 #include "pipeline/skinning/segment_body.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/host/parallel.h"
 #include "core/voxels/components.h"
@@ -146,11 +147,11 @@ Mask SegmentBody::Run(const Inputs& inputs, const Options&, StageContext& contex
   const Mask pieces = KeepLargePieces(AboveSkinLevel(smooth, tissue, *level), kSmallPiece);
   const Mask bright = WithoutGhosts(smooth, pieces, *level);
   // In MR, tables and casts are dark, and skin over dark tendons is a shell of its own
-  const Mask body =
+  Mask body =
       WithoutOtherLimbs(FillHoles(IsMagnitude(scan.volume) ? WithDimTissue(smooth, bright, *level)
                                                            : WithoutSurroundings(bright, *inputs.bones)),
                         *inputs.bones);
-  return WithDarkBone(body, inputs.bones->labels);
+  return WithDarkBone(std::move(body), inputs.bones->labels);
 }
 
 }  // namespace kvx

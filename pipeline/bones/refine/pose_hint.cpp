@@ -37,9 +37,7 @@ double AcrossMm(const BoneSet& bones) {
 }
 
 double BeyondMm(const PointMm& place, const Grid& grid) {
-  const Eigen::Vector3d vox = grid.ToVox(place).ijk, last = (grid.size.array() - 1).cast<double>();
-  const PointVox nearest{vox.cwiseMax(Eigen::Vector3d::Zero()).cwiseMin(last)};
-  return (grid.ToMm(nearest).lps - place.lps).norm();
+  return (grid.ToMm(grid.Nearest(grid.ToVox(place))).lps - place.lps).norm();
 }
 
 }  // namespace

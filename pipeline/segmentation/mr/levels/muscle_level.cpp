@@ -10,6 +10,7 @@
 #include "core/numbers/quantile.h"
 #include "core/voxels/dilated.h"
 #include "core/voxels/gaussian_blur.h"
+#include "core/voxels/to_corner.h"
 #include "core/voxels/voxel_box.h"
 #include "pipeline/segmentation/mr/levels/marrow_level.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
@@ -57,10 +58,8 @@ Noise NoiseIn(const Volume& scan, const Eigen::Vector3i& low) {
 Noise OfDarkestCorner(const Volume& scan) {
   std::vector<Noise> corners;
   const Eigen::Vector3i last = (scan.grid.size.array() - kBoxVoxels).max(0);
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3i ends(corner & 1, corner >> 1 & 1, corner >> 2);
-    corners.push_back(NoiseIn(scan, ends.cwiseProduct(last)));
-  }
+  for (int corner = 0; corner < 8; ++corner)
+    corners.push_back(NoiseIn(scan, ToCorner(corner).cwiseProduct(last)));
   return *std::ranges::min_element(corners, {}, &Noise::mean);
 }
 

@@ -31,12 +31,24 @@ void RequireListed(const LabelMap& strokes, const std::vector<int>& listed) {
   }
 }
 
+std::vector<std::string> WordedInAir(const DenseInAir& in_air) {
+  if (in_air.all) {
+    return {
+        "all that is dense in this scan lies in air: bones without flesh, or a cast that touches its bones; "
+        "check the labels, and draw strokes (seeds) instead where they are wrong"};
+  }
+  if (in_air.dropped == 0) return {};
+  return {"what is dense and lies in air, as a table or a cast does, is taken for no bone (pieces: " +
+          std::to_string(in_air.dropped) + "); draw strokes (seeds) instead where a bone is missing"};
+}
+
 // Parts that are not sure are not looked at again: what their deep voxels stand for is not known.
 SegmentedBones BonesByThreshold(const Volume& scan_hu, const BoneLevels& levels, const Progress& progress) {
-  SegmentedBones bones{ThresholdBones(scan_hu, levels), {}, true, {}, {}};
+  DenseBones dense = ThresholdBones(scan_hu, levels);
+  SegmentedBones bones{std::move(dense.labels), WordedInAir(dense.in_air), true, {}, {}};
   progress.Report(SegmentBones::kName, 0.2);
   if (KeptOtherwise(scan_hu, levels.parting_hu) < kSurelyKept) {
-    bones.warnings.push_back(
+    bones.warnings.emplace_back(
         "where bones meet in this scan is not sure (a threshold a little higher or lower, say, parts it "
         "otherwise): bones may be joined, or in pieces; "
         "check the labels, and draw strokes (seeds) instead where they are wrong");
@@ -44,7 +56,7 @@ SegmentedBones BonesByThreshold(const Volume& scan_hu, const BoneLevels& levels,
   }
   bones.labels = RefinedParts(scan_hu, bones.labels, levels.parting_hu, progress.Part(0.3, 1.0));
   if (scan_hu.grid.spacing_mm.maxCoeff() > kGapMm) {
-    bones.warnings.push_back(
+    bones.warnings.emplace_back(
         "the voxels are as thick as the gaps of joints, so bones that touch may not have come apart; check "
         "the labels, and draw strokes (seeds) where they are wrong");
   }

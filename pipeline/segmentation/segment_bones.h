@@ -21,7 +21,7 @@ void Fields(A& a, SegmentedBones& v) {
 
 struct SegmentBones {
   static constexpr std::string_view kName = "segment";
-  static constexpr int kVersion = 25;
+  static constexpr int kVersion = 26;
   struct Inputs {
     const Artifact<Scan>& scan;
     Digest strokes_content;              // ContentDigest(strokes_path); zero without strokes

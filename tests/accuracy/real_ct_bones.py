@@ -6,7 +6,7 @@
 The bones of a wrist of which `wrist-bone-ct-crops` has the real CT (radius, ulna, metacarpals 2 and 3), laid into
 soft tissue of 40 HU within fat and air, by themselves and as a wrist (radius and ulna side by side, 0.8 mm or 1.6 mm
 apart, metacarpals as far from the radius), blurred by half a voxel, with noise, on voxels as scanned
-(0.4 x 0.4 x 0.625 mm), twice and three times as wide. Printed for each: the Dice of every bone with the label most
+(0.4 x 0.4 x 0.625 mm), twice and three times as wide; the wrist also on a table and in a cast with 3 mm of padding. Printed for each: the Dice of every bone with the label most
 like it, and how many labels were found. A bone is all that its crop shows, marrow included. Needs numpy, scipy and
 nibabel.
 """
@@ -19,7 +19,7 @@ import nibabel
 import numpy as np
 from scipy import ndimage
 
-AIR_HU, FAT_HU, SOFT_HU = -1000, -100, 40
+AIR_HU, FAT_HU, SOFT_HU, TABLE_HU, CAST_HU = -1000, -100, 40, 1000, 1000
 STORED_ABOVE_HU = 1024
 MARGIN = 16
 
@@ -69,7 +69,21 @@ def pushed(placed, shape, labels, at, step, apart):
         at = beside
 
 
-def scene(placed, shape, noise_hu, seed):
+def on_a_table(greys, limb, spacing):
+    """Two sheets of 2.5 mm, 15 mm apart, below the limb."""
+    below = limb.any((0, 2)).argmax()
+    for top_mm in (0, 15):
+        top = below - round(top_mm / spacing[1])
+        sheet = slice(max(top - round(2.5 / spacing[1]), 0), max(top, 0))
+        greys[:, sheet][~limb[:, sheet]] = TABLE_HU
+
+
+def in_a_cast(greys, limb, spacing):
+    outside_mm = ndimage.distance_transform_edt(~limb, sampling=spacing)
+    greys[(outside_mm > 3) & (outside_mm < 7)] = CAST_HU
+
+
+def scene(placed, shape, noise_hu, seed, spacing=None, add=None):
     greys, labels = np.full(shape, float(SOFT_HU)), np.zeros(shape, np.uint16)
     for hu, bone, at in placed:
         here = window(at, bone)
@@ -81,8 +95,12 @@ def scene(placed, shape, noise_hu, seed):
     fat = limb & ~ndimage.binary_erosion(limb, iterations=6, border_value=1)
     greys[fat & ~ndimage.binary_dilation(labels > 0, iterations=2)] = FAT_HU
     greys[~limb] = AIR_HU
+    if add:
+        room = ((50, 50), (50, 50), (0, 0))
+        greys, labels, limb = np.pad(greys, room, constant_values=AIR_HU), np.pad(labels, room), np.pad(limb, room)
+        add(greys, limb, spacing)
     greys = ndimage.gaussian_filter(greys, 0.5)
-    return greys + np.random.default_rng(seed).normal(0, noise_hu, shape), labels
+    return greys + np.random.default_rng(seed).normal(0, noise_hu, greys.shape), labels
 
 
 def coarser(greys, labels, factor):
@@ -111,6 +129,8 @@ def scenes(shared):
             labels = bones[name][1]
             placed.append((*bones[name], pushed(placed, shape, labels, at, np.array(step), apart)))
         yield f"wrist, {apart} voxels apart", *scene(placed, shape, 25, apart), spacing
+    for add in (on_a_table, in_a_cast):
+        yield f"wrist, {add.__name__.replace('_', ' ')}", *scene(placed, shape, 25, 4, spacing, add), spacing
 
 
 def dice(truth, found):

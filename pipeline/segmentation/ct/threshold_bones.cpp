@@ -65,8 +65,16 @@ double LevelOfSurface(const Volume& scan, double rough_hu) {
   return slopes > 0 ? sum / slopes : rough_hu;
 }
 
-Image<int32_t> PartsAt(const Volume& scan, double level_hu, double least_seam) {
-  return JoinedParts(scan, PartAtNecks(FillHoles(Above(scan, level_hu))), least_seam);
+struct DenseParts {
+  Image<int32_t> number;  // 0 outside
+  DenseInAir in_air;
+};
+
+// A cast encloses its limb: it goes before holes are filled.
+DenseParts PartsAt(const Volume& scan, double level_hu, double least_seam) {
+  Mask dense = Above(scan, level_hu);
+  const DenseInAir in_air = DropPiecesInAir(scan, dense);
+  return {JoinedParts(scan, PartAtNecks(FillHoles(dense)), least_seam), in_air};
 }
 
 // Without parts that are too small for a bone.
@@ -116,10 +124,10 @@ BoneLevels LevelsOf(const Volume& scan, std::optional<double> given_hu) {
   return {bone_hu, found_hu > kClearlyDenser * bone_hu ? found_hu : bone_hu};
 }
 
-LabelMap ThresholdBones(const Volume& scan, const BoneLevels& levels, double least_seam) {
-  Image<int32_t> part = PartsAt(scan, levels.bone_hu, least_seam);
+DenseBones ThresholdBones(const Volume& scan, const BoneLevels& levels, double least_seam) {
+  auto [part, in_air] = PartsAt(scan, levels.bone_hu, least_seam);
   if (levels.parting_hu > levels.bone_hu)
-    part = AsPartedBy(PartsAt(scan, levels.parting_hu, least_seam), part);
+    part = AsPartedBy(PartsAt(scan, levels.parting_hu, least_seam).number, part);
   const std::vector<size_t> voxels = VoxelsByNumber(part);
   std::vector<uint16_t> label_of(voxels.size(), 0);
   uint16_t label = 0;
@@ -130,7 +138,7 @@ LabelMap ThresholdBones(const Volume& scan, const BoneLevels& levels, double lea
   if (label == 0) throw InputError("nothing is as dense as the threshold; give a lower bones.threshold");
   LabelMap labels(scan.grid);
   for (size_t v = 0; v < labels.values.size(); ++v) labels.values[v] = label_of[part.values[v]];
-  return labels;
+  return {std::move(labels), in_air};
 }
 
 }  // namespace kvx

@@ -4,6 +4,7 @@
 
 #include "core/image.h"
 #include "pipeline/segmentation/ct/joined_parts.h"
+#include "pipeline/segmentation/ct/pieces_in_air.h"
 
 namespace kvx {
 
@@ -19,8 +20,12 @@ struct BoneLevels {
 // low levels spongy ends of bones are filled, and necks part them from their shafts.
 BoneLevels LevelsOf(const Volume& scan, std::optional<double> given_hu);
 
-// Labels 1, 2, ... by size, largest first; pieces under 0.2 cm3 are dropped. `least_seam`: as of JoinedParts.
-// Throws InputError when nothing is left.
-LabelMap ThresholdBones(const Volume& scan, const BoneLevels& levels, double least_seam = kLeastSeam);
+struct DenseBones {
+  LabelMap labels;  // 1, 2, ... by size, largest first
+  DenseInAir in_air;
+};
+
+// Pieces under 0.2 cm3 are dropped. `least_seam`: as of JoinedParts. Throws InputError when nothing is left.
+DenseBones ThresholdBones(const Volume& scan, const BoneLevels& levels, double least_seam = kLeastSeam);
 
 }  // namespace kvx

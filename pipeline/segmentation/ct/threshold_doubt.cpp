@@ -16,7 +16,7 @@ constexpr double kALittle = 0.15;  // of the level
 
 LabelMap PartsAt(const Volume& scan_hu, double level_hu, double least_seam = kLeastSeam) {
   try {
-    return ThresholdBones(scan_hu, {level_hu, level_hu}, least_seam);
+    return ThresholdBones(scan_hu, {level_hu, level_hu}, least_seam).labels;
   } catch (const InputError&) {  // nothing is as dense
     return LabelMap(scan_hu.grid);
   }

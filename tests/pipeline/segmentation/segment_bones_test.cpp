@@ -62,22 +62,23 @@ TEST(SegmentBones, AScanIsNoPreviousLabelMap) {
 }
 
 // A real CT of a wrist's bones (greys are HU + 1024, 0 around), cut out and laid into soft tissue, with air
-// at one side.
+// at one side, and a table of so many voxels in it.
 struct RealBones {
   Scan scan;
   LabelMap truth;  // one label for all
 
-  explicit RealBones(const std::string& name) {
+  explicit RealBones(const std::string& name, int table = 0) {
     const Volume crop =
         ReadScan(testing_support::SharedData() / "wrist-bone-ct-crops" / (name + ".nii.gz")).volume;
     constexpr int kMargin = 12;
     Grid grid = crop.grid;
-    grid.size += Eigen::Vector3i(2 * kMargin, 2 * kMargin, 4);
+    grid.size += Eigen::Vector3i(2 * kMargin, 2 * (kMargin + table), 4);
     scan.volume = Volume(grid, 40.0f);
     truth = LabelMap(grid);
     for (size_t v = 0; v < truth.values.size(); ++v) {
-      const Eigen::Vector3i p = grid.Ijk(v) - Eigen::Vector3i(kMargin, kMargin, 2);
+      const Eigen::Vector3i p = grid.Ijk(v) - Eigen::Vector3i(kMargin, kMargin + 2 * table, 2);
       if (p.y() < 4 - kMargin) scan.volume.values[v] = -1000;
+      if (grid.Ijk(v).y() < table) scan.volume.values[v] = 1100;
       if (!crop.grid.Contains(p) || crop(p.x(), p.y(), p.z()) <= 0) continue;
       scan.volume.values[v] = crop(p.x(), p.y(), p.z()) - 1024;
       truth.values[v] = 1;
@@ -101,6 +102,15 @@ TEST(SegmentBones, ARealBoneWithMarrowAndSpongyEndsIsOneByThreshold) {
   const RealBones metacarpal("mc3");
   const SegmentedBones found = metacarpal.ByThreshold();
   EXPECT_THAT(found.warnings, testing::IsEmpty());
+  EXPECT_EQ(VoxelsByLabel(found.labels).size(), 2u);
+  EXPECT_GT(testing_support::Dice(found.labels, metacarpal.truth, 1), 0.97);
+}
+
+TEST(SegmentBones, ATableIsToldAndIsNoBone) {
+  if (!testing_support::HasSharedData()) GTEST_SKIP() << "no shared data here";
+  const RealBones metacarpal("mc3", 16);
+  const SegmentedBones found = metacarpal.ByThreshold();
+  EXPECT_THAT(found.warnings, testing::ElementsAre(testing::HasSubstr("as a table or a cast does")));
   EXPECT_EQ(VoxelsByLabel(found.labels).size(), 2u);
   EXPECT_GT(testing_support::Dice(found.labels, metacarpal.truth, 1), 0.97);
 }

@@ -39,7 +39,7 @@ TEST(ThresholdBones, PartsTouchingBallsAndFillsTheirMarrow) {
   const double level = FindBoneLevel(scan);
   EXPECT_GT(level, 40);
   EXPECT_LT(level, 900);
-  const LabelMap labels = ThresholdBones(scan, LevelsOf(scan, level));
+  const LabelMap labels = ThresholdBones(scan, LevelsOf(scan, level)).labels;
   EXPECT_EQ(std::set<uint16_t>(labels.values.begin(), labels.values.end()), (std::set<uint16_t>{0, 1, 2}));
   size_t wrong = 0, all = 0;
   for (size_t v = 0; v < labels.values.size(); ++v) {
@@ -114,7 +114,7 @@ TEST(ThresholdBones, AHollowBoneWithASpongyEndIsOne) {
     const int rods = (p.x() % 6 < 2) + (p.y() % 6 < 2) + (p.z() % 6 < 2);
     scan.values[v] = to_surface > -1.5 ? 1200.0f : mm.z() > -6 && rods > 1 ? 900.0f : -60.0f;
   }
-  const LabelMap labels = ThresholdBones(scan, LevelsOf(scan, std::nullopt));
+  const LabelMap labels = ThresholdBones(scan, LevelsOf(scan, std::nullopt)).labels;
   EXPECT_EQ(std::set<uint16_t>(labels.values.begin(), labels.values.end()), (std::set<uint16_t>{0, 1}));
 }
 
@@ -133,7 +133,7 @@ TEST(ThresholdBones, ALowLevelPartsBonesWhereTheDenserOneOfTheScanDoes) {
   }
   EXPECT_GT(LevelsOf(scan, 200).parting_hu, 400);
   EXPECT_EQ(LevelsOf(scan, 900).parting_hu, 900);
-  const LabelMap labels = ThresholdBones(scan, LevelsOf(scan, 200));
+  const LabelMap labels = ThresholdBones(scan, LevelsOf(scan, 200)).labels;
   EXPECT_EQ(std::set<uint16_t>(labels.values.begin(), labels.values.end()), (std::set<uint16_t>{0, 1}));
   EXPECT_EQ(labels(24, 24, 104), 1) << "what the lower level adds is the bone's, too";
 }

@@ -5,6 +5,7 @@
 
 #include "core/voxels/components.h"
 #include "core/voxels/distance_transform.h"
+#include "pipeline/segmentation/ct/pieces_in_air.h"
 
 namespace kvx {
 namespace {
@@ -23,6 +24,7 @@ Mask Dense(const Volume& scan_hu) {
     if (dense.values[v] && double(pieces.voxels[size_t(pieces.piece.values[v])]) * voxel_mm3 < kSpeckMm3)
       dense.values[v] = 0;
   }
+  DropPiecesInAir(scan_hu, dense);  // within a cast no ball would reach the limb
   return dense;
 }
 

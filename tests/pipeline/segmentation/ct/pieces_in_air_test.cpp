@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/voxels/components.h"
+#include "pipeline/segmentation/ct/ct_outside.h"
 #include "pipeline/segmentation/ct/threshold_bones.h"
 #include "tests/support/plain_grid.h"
 
@@ -94,6 +95,13 @@ TEST(ThresholdBones, ACastIsNoBoneAroundTheLimb) {
   EXPECT_EQ(bones.labels(20, 30, 20), 1);
   EXPECT_EQ(bones.labels(39, 30, 20), 2);
   EXPECT_EQ(bones.labels(30, 42, 20), 0) << "tissue";
+}
+
+TEST(OutsideOfBones, ReachesTheTissueInACast) {
+  const Volume scan = Scene().WithRod(600, 23).WithRod(-950, 19).WithRod(40, 16).WithRod(800, 4).scan;
+  const Mask outside = OutsideOfBones(scan);
+  EXPECT_TRUE(outside(30 + 17, 30, 70)) << "13.6 mm beside the bone's middle";
+  EXPECT_FALSE(outside(30 + 8, 30, 70)) << "6.4 mm beside it";
 }
 
 }  // namespace

@@ -9,7 +9,8 @@
 namespace kvx {
 
 // Long loops call Report now and then; it throws Cancelled when somebody asked for the work to stop. `cancel`
-// may be asked on several threads at once, the sink is told on one at a time.
+// may be asked on several threads at once, the sink is told on one at a time: loops on many threads, and
+// those that have nothing to tell, call ThrowIfCancelled.
 class Progress {
  public:
   using Sink = std::function<void(std::string_view stage, double fraction)>;  // fraction of the whole, 0..1
@@ -19,8 +20,11 @@ class Progress {
   Progress(Sink sink, Cancel cancel) : sink_(std::move(sink)), cancel_(std::move(cancel)) {}
 
   void Report(std::string_view stage, double fraction) const {
-    if (IsCancelled()) throw Cancelled();
+    ThrowIfCancelled();
     if (sink_) sink_(stage, begin_ + fraction * (end_ - begin_));
+  }
+  void ThrowIfCancelled() const {
+    if (IsCancelled()) throw Cancelled();
   }
   bool IsCancelled() const { return cancel_ && cancel_(); }
   // A view whose 0..1 is [begin, end] of this one.

@@ -16,14 +16,12 @@ constexpr double kProbeMm = 0.2, kNearEnoughMm = 1e-3;
 constexpr size_t kAtOnce = 512;
 constexpr size_t kNodesPerLook = size_t(1) << 16;  // between two questions whether to go on
 
-void StopIfAsked(const Progress& silent) { silent.Report("field", 0); }
-
 struct Sample {
   PointMm in_template, posed;
 };
 
 std::vector<Sample> Samples(const PosingEngine& engine, const Mask& body, const ResolvedPose& pose,
-                            const Progress& silent) {
+                            const Progress& progress) {
   const size_t inside =
       size_t(std::count_if(body.values.begin(), body.values.end(), [](uint8_t v) { return v != 0; }));
   if (inside == 0) throw InputError("the model has no body");
@@ -36,7 +34,7 @@ std::vector<Sample> Samples(const PosingEngine& engine, const Mask& body, const 
   }
   std::vector<Sample> out(points.size());
   ParallelFor((points.size() + kAtOnce - 1) / kAtOnce, [&](size_t part) {
-    StopIfAsked(silent);
+    progress.ThrowIfCancelled();
     const size_t begin = part * kAtOnce, end = std::min(begin + kAtOnce, points.size());
     const auto posed = engine.MapPoints(
         pose, {points.begin() + std::ptrdiff_t(begin), points.begin() + std::ptrdiff_t(end)});
@@ -47,7 +45,7 @@ std::vector<Sample> Samples(const PosingEngine& engine, const Mask& body, const 
 
 // The nearest sample of every node: each node's own cell first, then ring by ring from node to node.
 std::vector<int32_t> NearestSamples(const Grid& grid, const std::vector<Sample>& samples,
-                                    const Progress& silent) {
+                                    const Progress& progress) {
   std::vector<int32_t> nearest(grid.VoxelCount(), -1);
   const auto distance = [&](size_t node, int32_t sample) {
     return (grid.ToMm(PointVox{grid.Ijk(node).cast<double>()}).lps - samples[size_t(sample)].posed.lps)
@@ -66,7 +64,7 @@ std::vector<int32_t> NearestSamples(const Grid& grid, const std::vector<Sample>&
   for (bool changed = true, forth = true; changed; forth = !forth) {
     changed = false;
     for (size_t n = 0; n < nearest.size(); ++n) {
-      if (n % kNodesPerLook == 0) StopIfAsked(silent);
+      if (n % kNodesPerLook == 0) progress.ThrowIfCancelled();
       const size_t node = forth ? n : nearest.size() - 1 - n;
       const Eigen::Vector3i at = grid.Ijk(node);
       for (int side = 0; side < 6; ++side) {
@@ -116,14 +114,13 @@ void StateErrors(InverseGrid& out, const std::vector<Sample>& samples) {
 
 InverseGrid CoarseInverse(const PosingEngine& engine, const Mask& body, const ResolvedPose& pose, int level,
                           const Progress& progress) {
-  const Progress silent = progress.Silent();
   const Grid grid = engine.FittedGrid(pose, level);
-  const std::vector<Sample> samples = Samples(engine, body, pose, silent);
-  const std::vector<int32_t> nearest = NearestSamples(grid, samples, silent);
+  const std::vector<Sample> samples = Samples(engine, body, pose, progress);
+  const std::vector<int32_t> nearest = NearestSamples(grid, samples, progress);
   InverseGrid out;
   out.template_from_posed = DisplacementField(grid, Eigen::Vector3f::Zero());
   ParallelFor((nearest.size() + kAtOnce - 1) / kAtOnce, [&](size_t part) {
-    StopIfAsked(silent);
+    progress.ThrowIfCancelled();
     for (size_t node = part * kAtOnce; node < std::min((part + 1) * kAtOnce, nearest.size()); ++node) {
       if (nearest[node] < 0) continue;
       const PointMm wanted = grid.ToMm(PointVox{grid.Ijk(node).cast<double>()});

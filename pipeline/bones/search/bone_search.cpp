@@ -62,7 +62,7 @@ BoneSearch::BoneSearch(const SoughtBones& sought, const Volume& scan, Backend& b
     : sought_(sought),
       scan_levels_(MakeLevels(scan, sought.CoarserLevelsMm())),
       scores_(backend),
-      progress_(progress.Silent()) {
+      progress_(progress) {
   for (const Volume& level : scan_levels_) device_levels_.emplace_back(backend, level);
   for (const auto& [name, pose] : hints) {
     const int bone = bones().IndexOf(name);

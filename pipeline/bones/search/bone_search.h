@@ -70,7 +70,7 @@ class BoneSearch {
   // At the level at which a bone is looked for first.
   const DeviceScan& DeviceLevelOf(int bone) const { return device_levels_[sought_.FirstLevelOf(bone)]; }
   const BoneScores& scores() const { return scores_; }
-  void ThrowIfCancelled() const { progress_.Report("", 0); }
+  void ThrowIfCancelled() const { progress_.ThrowIfCancelled(); }
   // The best `count` of candidates, best first, none too near a better one.
   std::vector<Candidate> Distinct(int bone, const std::vector<Candidate>& all, size_t count) const;
   double OverlapWith(int bone, const RigidTransform& pose, const PartialPose& placed,

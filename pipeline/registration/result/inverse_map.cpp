@@ -109,9 +109,8 @@ DisplacementField InverseField(const BorderedField& scan_from_template, const Ma
   const InverseMap template_from_scan(scan_from_template, body, scan);
   constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
   DisplacementField out(scan, Eigen::Vector3f::Constant(kNan));
-  const Progress silent = progress.Silent();
   ParallelEach(out.values.size(), [&](size_t v) {
-    if (v % kVoxelsPerLook == 0) silent.Report("field", 0);
+    if (v % kVoxelsPerLook == 0) progress.ThrowIfCancelled();
     const PointMm x = scan.ToMm(PointVox{scan.Ijk(v).cast<double>()});
     if (const auto found = template_from_scan(x)) out.values[v] = (found->lps - x.lps).cast<float>();
   });

@@ -151,11 +151,11 @@ void Open(const Stencil& stencil, double bone_share, ElasticLattice& lattice) {
 }
 
 // Opens the folded voxels one after the other; those that this folds come next.
-void OpenAll(const Mask& body, const WorkRegion& region, const Progress& silent, std::vector<uint32_t> folded,
-             ElasticLattice& lattice) {
+void OpenAll(const Mask& body, const WorkRegion& region, const Progress& progress,
+             std::vector<uint32_t> folded, ElasticLattice& lattice) {
   for (const auto& [rounds, bone_share] : kOpenings) {
     for (int round = 0; round < rounds && !folded.empty(); ++round) {
-      silent.Report("", 0);
+      progress.ThrowIfCancelled();
       for (const uint32_t v : folded)
         Open(StencilOf(region, body.grid, region.grid.Ijk(v)), bone_share, lattice);
       folded = Folded(Around(folded, 2, region.grid), lattice.positions_mm, body, region);
@@ -179,12 +179,12 @@ class Room {
 };
 
 // False, and all as it was, where a node would leave the room.
-bool RelaxWithin(const Room& room, std::span<const uint32_t> nodes, const Progress& silent,
+bool RelaxWithin(const Room& room, std::span<const uint32_t> nodes, const Progress& progress,
                  ElasticLattice& lattice) {
   std::vector<Eigen::Vector3f> before_mm;
   for (const uint32_t n : nodes) before_mm.push_back(lattice.positions_mm[n]);
   for (int sweep = 0; sweep < kSweeps; ++sweep) {
-    silent.Report("", 0);
+    progress.ThrowIfCancelled();
     reference::Relax(lattice, 1, nodes);
   }
   if (std::ranges::all_of(nodes, [&](uint32_t n) { return room.Has(lattice.positions_mm[n]); })) return true;
@@ -205,7 +205,6 @@ void Unfold(const LabelMap& bone_labels, const Mask& body, const WorkRegion& reg
   std::vector<uint32_t> folded = AllFolded(scan_mm, body, region);
   if (folded.empty()) return;
   ElasticLattice lattice = LatticeOf(bone_labels, body, region);
-  const Progress silent = progress.Silent();
   const Room room(scan_mm);
   lattice.positions_mm = std::move(scan_mm);
   lattice.volume_stiffness = kVolumeStiffness;
@@ -213,13 +212,13 @@ void Unfold(const LabelMap& bone_labels, const Mask& body, const WorkRegion& reg
   for (int round = 0; round < kRounds && !folded.empty(); ++round) {
     const int reach = std::min(3, 1 + round / 4);
     if (round % 4 == 3) lattice.volume_stiffness *= 2;
-    if (!RelaxWithin(room, Around(folded, reach, region.grid), silent, lattice)) {
+    if (!RelaxWithin(room, Around(folded, reach, region.grid), progress, lattice)) {
       folded.clear();
       break;
     }
     folded = Folded(Around(folded, reach + 1, region.grid), lattice.positions_mm, body, region);
   }
-  OpenAll(body, region, silent, std::move(folded), lattice);
+  OpenAll(body, region, progress, std::move(folded), lattice);
   scan_mm = std::move(lattice.positions_mm);
 }
 

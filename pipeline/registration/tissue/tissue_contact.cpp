@@ -235,8 +235,7 @@ std::vector<ContactPush> TissueContact::Find(const ElasticLattice& lattice, int 
 
 void RelaxInContact(const ElasticSweeps& relax, const TissueContact& contact, int step, int sweeps,
                     const Progress& progress, ElasticLattice& lattice) {
-  const Progress silent = progress.Silent();
-  silent.Report("", 0);
+  progress.ThrowIfCancelled();
   const auto prepared = relax.Prepare(lattice);
   std::vector<ContactPush> pushes = contact.Find(lattice, step);
   if (pushes.empty()) {
@@ -249,7 +248,7 @@ void RelaxInContact(const ElasticSweeps& relax, const TissueContact& contact, in
   const int hold_nodes = lattice.hold_nodes;
   Held held(lattice);
   for (int round = 0; round < kRounds && !pushes.empty(); ++round) {
-    silent.Report("", 0);
+    progress.ThrowIfCancelled();
     held.Push(lattice, pushes);
     lattice.holds = held.holds(), lattice.held_mm = held.mm(), lattice.hold_nodes = 1;
     relax(*prepared, lattice, std::max(1, 2 * sweeps / kRounds));

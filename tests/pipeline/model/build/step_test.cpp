@@ -142,10 +142,10 @@ TEST_F(StepTest, ReportsUnderTheNameItIsGiven) {
 TEST(Named, ASilentViewStopsAsTheWholeDoes) {
   bool stop = false;
   const Progress named = Named(Progress({}, [&] { return stop; }), "register_bones pose01");
-  EXPECT_NO_THROW(named.Silent().Report("", 0));
+  EXPECT_NO_THROW(named.Silent().ThrowIfCancelled());
   stop = true;
-  EXPECT_THROW(named.Silent().Report("", 0), Cancelled);
-  EXPECT_THROW(named.Report("", 0), Cancelled);
+  EXPECT_THROW(named.Silent().ThrowIfCancelled(), Cancelled);
+  EXPECT_THROW(named.ThrowIfCancelled(), Cancelled);
 }
 
 }  // namespace

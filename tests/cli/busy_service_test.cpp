@@ -82,7 +82,9 @@ TEST_F(BusyService, JobsAndCancelWaitForItToo) {
     service.tries = 0;
     std::vector<std::string> all = words;
     all.insert(all.end(), {"--server", service.url()});
+    const auto before = std::signal(SIGINT, SIG_IGN);  // as where tests run in the background
     Program command(scratch.path(), all);
+    std::signal(SIGINT, before);
     while (command.Running() && service.tries < 3) std::this_thread::sleep_for(std::chrono::milliseconds(10));
     command.Signal(SIGINT);
     EXPECT_EQ(command.Wait().err, "kinevox: waiting: being upgraded\n") << words[0];

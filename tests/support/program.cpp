@@ -35,6 +35,7 @@ Program::Program(const std::filesystem::path& folder, const std::vector<std::str
   if (pid_ == 0) {
     dup2(out, STDOUT_FILENO);
     dup2(err, STDERR_FILENO);
+    signal(SIGINT, SIG_DFL);  // shells have what they start in the background ignore it
     execv(argv[0], argv.data());
     _exit(127);
   }

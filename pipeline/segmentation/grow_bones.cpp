@@ -16,6 +16,7 @@
 #include "pipeline/segmentation/mr/levels/muscle_level.h"
 #include "pipeline/segmentation/mr/mr_bones.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
+#include "pipeline/segmentation/strokes/stroke_doubts.h"
 
 namespace kvx {
 namespace {
@@ -46,6 +47,14 @@ const char kUnlike[] =
     "the ways of looking do not agree, or hardly any dark cortex lies under the surface, so that what was "
     "found may well be too small, too large or beside the bone; look at it, and draw more strokes in the "
     "bone and around it";
+
+const char kApart[] =
+    "it was found in pieces that do not touch, with strokes of it in more than one of them: a part between "
+    "them may be missing, or strokes lie outside the bone; look at them, and draw strokes where it goes on";
+
+const char kWithin[] =
+    "strokes of the background or of another bone lie inside what was found of it: either they are wrong, or "
+    "what is around them is none of it; look there, and mark more of it or take them away";
 
 class Grower {
  public:
@@ -138,6 +147,7 @@ class Grower {
       if (!ct_) Expect(finishes[b], bones_[b].label, signs_[b]);
       DoubtFinished(finishes[b], bones_[b]);
     }
+    DoubtStrokes();
   }
 
   void Expect(const BoneFinish& finish, int label, SearchSigns signs) {
@@ -151,8 +161,25 @@ class Grower {
     if (finish.bare) Warn(bone.label, kBareStrokes);
     if (finish.marked > kMostlyMarked && dice < kSureDice) Warn(bone.label, kHardlyMore);
     if (bone.reaches_box) Warn(bone.label, kBeyond);
-    const bool told = std::ranges::find(out_.doubts, bone.label, &BoneDoubt::label) != out_.doubts.end();
-    if (!ct_ && !told && dice < kDoubtfulDice) Warn(bone.label, kUnlike);
+    if (!ct_ && !IsTold(bone.label) && dice < kDoubtfulDice) Warn(bone.label, kUnlike);
+  }
+  bool IsTold(int label) const {
+    return std::ranges::find(out_.doubts, label, &BoneDoubt::label) != out_.doubts.end();
+  }
+
+  // Of the bones that were looked for.
+  void DoubtStrokes() {
+    const std::map<int, size_t> within = StrokesWithin(out_.labels, strokes_);
+    std::vector<size_t> apart(bones_.size());
+    ParallelFor(bones_.size(), [&](size_t b) {
+      apart[b] = StrokesApart(out_.labels, strokes_, bones_[b].label, bones_[b].box);
+    });
+    for (size_t b = 0; b < bones_.size(); ++b) {
+      const int label = bones_[b].label;
+      const auto other = within.find(label);
+      if (apart[b] >= kSeveralApart && !IsTold(label)) Warn(label, kApart);
+      if (other != within.end() && other->second >= kSeveralWithin) Warn(label, kWithin);
+    }
   }
 
   // What another bone took meanwhile stays there.

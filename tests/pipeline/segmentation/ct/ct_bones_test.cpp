@@ -1,6 +1,7 @@
 // Hollow balls in CT whose marrow looks like the tissue around them: only their shells tell where they end.
 #include "pipeline/segmentation/ct/ct_bones.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <random>
@@ -99,7 +100,19 @@ TEST(CtBones, WhatIsMarkedAsBackgroundIsInNone) {
     for (size_t v = 0; v < body.strokes.values.size(); ++v)
       given += body.strokes.values[v] == kBackgroundStroke && grown.labels.values[v] != 0;
     EXPECT_EQ(given, 0u) << (previous ? "after" : "afresh");
+    EXPECT_THAT(grown.doubts, testing::ElementsAre(testing::FieldsAre(
+                                  1, testing::HasSubstr("of the background or of another bone lie inside"))));
   }
+}
+
+// In muscle, far from the ball: a lump of muscle is found around them.
+TEST(CtBones, StrokesOutsideOfTheirBoneAreToldOf) {
+  Body body = MakeBody(50, 20);
+  DrawStrokes(body);
+  for (int i = 4; i < 10; ++i) body.strokes(i, 22, 26) = 2;
+  const GrownBones grown = GrowBones(body.scan, body.strokes, true, {});
+  EXPECT_THAT(grown.doubts,
+              testing::ElementsAre(testing::FieldsAre(2, testing::HasSubstr("pieces that do not touch"))));
 }
 
 TEST(OutsideOfBones, RollsAroundAShellWithAGap) {

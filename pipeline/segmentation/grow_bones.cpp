@@ -10,6 +10,7 @@
 #include "core/host/parallel.h"
 #include "core/voxels/axes_order.h"
 #include "pipeline/scans/grey_kind.h"
+#include "pipeline/segmentation/ct/canal.h"
 #include "pipeline/segmentation/ct/ct_bones.h"
 #include "pipeline/segmentation/ct/part_bones.h"
 #include "pipeline/segmentation/finish_bone.h"
@@ -48,6 +49,12 @@ const char kUnlike[] =
     "found may well be too small, too large or beside the bone; look at it, and draw more strokes in the "
     "bone and around it";
 
+const char kDarkMuscle[] =
+    "muscle is nearly as dark as cortex in this scan, so that what was found may well be too large, too "
+    "small "
+    "or beside the bone; look at its borders, draw more strokes in it, and mark the background where it goes "
+    "too far";
+
 const char kApart[] =
     "it was found in pieces that do not touch, with strokes of it in more than one of them: a part between "
     "them may be missing, or strokes lie outside the bone; look at them, and draw strokes where it goes on";
@@ -55,6 +62,11 @@ const char kApart[] =
 const char kWithin[] =
     "strokes of the background or of another bone lie inside what was found of it: either they are wrong, or "
     "what is around them is none of it; look there, and mark more of it or take them away";
+
+const char kCanal[] =
+    "a part of it is as soft as muscle and goes on outside of it, as the spinal canal does, and hardly a "
+    "stroke "
+    "marks it; if it is none of the bone, mark it as background";
 
 class Grower {
  public:
@@ -101,7 +113,9 @@ class Grower {
   }
 
   void FindInMr() {
-    MrBones found = FindMrBones(*WithUsualMuscle(scan_, strokes_), strokes_, boxes_, out_.labels, progress_);
+    const UsualMuscle usual = WithUsualMuscle(scan_, strokes_);
+    MrBones found = FindMrBones(*usual.scan, strokes_, boxes_, out_.labels, progress_);
+    dark_muscle_ = usual.darker;
     bones_ = std::move(found.bones);
     signs_ = std::move(found.signs);
     out_.doubts.insert(out_.doubts.end(), found.doubts.begin(), found.doubts.end());
@@ -148,10 +162,11 @@ class Grower {
       DoubtFinished(finishes[b], bones_[b]);
     }
     DoubtStrokes();
+    if (ct_) DoubtCanals();
   }
 
   void Expect(const BoneFinish& finish, int label, SearchSigns signs) {
-    signs.marked = finish.marked, signs.bare = finish.bare;
+    signs.marked = finish.marked, signs.bare = finish.bare, signs.dark_muscle = dark_muscle_;
     out_.expected_dice[label] = ExpectedDice(signs);
   }
 
@@ -161,7 +176,8 @@ class Grower {
     if (finish.bare) Warn(bone.label, kBareStrokes);
     if (finish.marked > kMostlyMarked && dice < kSureDice) Warn(bone.label, kHardlyMore);
     if (bone.reaches_box) Warn(bone.label, kBeyond);
-    if (!ct_ && !IsTold(bone.label) && dice < kDoubtfulDice) Warn(bone.label, kUnlike);
+    if (ct_ || IsTold(bone.label) || dice >= DoubtfulDice(dark_muscle_)) return;
+    Warn(bone.label, dark_muscle_ > 0 ? kDarkMuscle : kUnlike);
   }
   bool IsTold(int label) const {
     return std::ranges::find(out_.doubts, label, &BoneDoubt::label) != out_.doubts.end();
@@ -180,6 +196,15 @@ class Grower {
       if (apart[b] >= kSeveralApart && !IsTold(label)) Warn(label, kApart);
       if (other != within.end() && other->second >= kSeveralWithin) Warn(label, kWithin);
     }
+  }
+
+  void DoubtCanals() {
+    std::vector<uint8_t> canal(bones_.size());
+    ParallelFor(bones_.size(), [&](size_t b) {
+      canal[b] = HoldsCanal(scan_, out_.labels, strokes_, bones_[b].label, bones_[b].box);
+    });
+    for (size_t b = 0; b < bones_.size(); ++b)
+      if (canal[b]) Warn(bones_[b].label, kCanal);
   }
 
   // What another bone took meanwhile stays there.
@@ -201,6 +226,7 @@ class Grower {
   std::vector<StrokeBox> boxes_;  // of the bones to be found
   std::vector<FoundBone> bones_;
   std::vector<SearchSigns> signs_;  // of each, in MR
+  double dark_muscle_ = 0;          // UsualMuscle::darker
 };
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "core/host/parallel.h"
 #include "core/numbers/quantile.h"
+#include "pipeline/segmentation/mr/levels/dark_inside.h"
 #include "pipeline/segmentation/mr/levels/noisy_scan.h"
 #include "pipeline/segmentation/mr/levels/stroke_levels.h"
 #include "pipeline/segmentation/mr/search/bone_in_pieces.h"
@@ -221,9 +222,12 @@ class MrSearch {
     const std::vector<PlacedShell> shells = PlaceShells(rough);
     ParallelFor(shells.size(), [&](size_t b) {
       const FoundBone before{.box = bones_[b].box, .mask = bones_[b].mask};
+      const FoundBone& bone = bones_[b];
+      const double marrow = marrow_.at(bone.label);
       Place(shells[b], bones_[b]);
-      signs_[b].stayed = Dice(before, bones_[b]);
-      signs_[b].unclear = ShareUnclear(*calm_, marrow_.at(bones_[b].label), bones_[b].box, bones_[b].mask);
+      signs_[b].stayed = Dice(before, bone);
+      signs_[b].unclear = ShareUnclear(*calm_, marrow, bone.box, bone.mask);
+      signs_[b].dark_inside = DarkInside(*calm_, marrow, bone.box, bone.mask);
     });
   }
 

@@ -114,19 +114,19 @@ std::optional<double> MuscleLevel(const Volume& scan, const LabelMap& strokes) {
   return marrow.empty() ? std::nullopt : MuscleIn(scan, RelativeTo(marrow, scan), strokes);
 }
 
-OwnOrLent<Volume> WithUsualMuscle(const Volume& scan, const LabelMap& strokes) {
+UsualMuscle WithUsualMuscle(const Volume& scan, const LabelMap& strokes) {
   const MarrowLevel marrow = MarrowOf(scan, strokes);
-  if (marrow.empty()) return scan;
+  if (marrow.empty()) return {scan};
   Volume relative = RelativeTo(marrow, scan);
   const std::optional<double> muscle = MuscleIn(scan, relative, strokes);
-  if (!muscle || *muscle >= kUsualMuscle) return scan;
+  if (!muscle || *muscle >= kUsualMuscle) return {scan};
   const double below = kUsualMuscle / *muscle, above = (1 - kUsualMuscle) / (1 - *muscle);
   ParallelEach(relative.values.size(), [&](size_t v) {
     const double r = relative.values[v], grey = scan.values[v];
     const double factor = r < *muscle ? below : r < 1 ? (1 - above * (1 - r)) / r : 1;
     relative.values[v] = float(factor * grey);
   });
-  return relative;
+  return {std::move(relative), 1 - *muscle / kUsualMuscle};
 }
 
 }  // namespace kvx

@@ -15,8 +15,13 @@ constexpr double kUsualMuscle = 0.47;  // of marrow, with which the search tells
 // there is no signal.
 std::optional<double> MuscleLevel(const Volume& scan, const LabelMap& strokes);
 
+struct UsualMuscle {
+  OwnOrLent<Volume> scan;  // lent where muscle is as bright as usual, or brighter
+  double darker = 0;       // that it was, from 0 (as usual) to 1 (black)
+};
+
 // With muscle as bright as usual: what is up to as bright as muscle times one factor, marrow and what is
-// brighter as it was, between them in proportion. Lent where muscle is as bright as usual, or brighter.
-OwnOrLent<Volume> WithUsualMuscle(const Volume& scan, const LabelMap& strokes);
+// brighter as it was, between them in proportion.
+UsualMuscle WithUsualMuscle(const Volume& scan, const LabelMap& strokes);
 
 }  // namespace kvx

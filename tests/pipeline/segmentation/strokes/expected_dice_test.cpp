@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 
 namespace kvx {
@@ -51,6 +52,12 @@ TEST(ExpectedDice, GrowsWithEverySignOfAnAnswerThatHolds) {
     make_worse(signs);
     EXPECT_LT(ExpectedDice(signs), ExpectedDice(usual));
   }
+  SearchSigns dark = usual;
+  dark.dark_inside = 0.3;
+  EXPECT_EQ(ExpectedDice(dark), ExpectedDice(usual)) << "thick cortex where muscle is bright";
+  dark.dark_muscle = 0.6;
+  EXPECT_NEAR(ExpectedDice(dark), ExpectedDice(usual) - 0.33 * 0.3 * std::sqrt(0.6), 1e-12);
+  EXPECT_GT(DoubtfulDice(dark.dark_muscle), DoubtfulDice(usual.dark_muscle));
   EXPECT_GE(ExpectedDice({.agreement = 0, .stayed = 0, .unclear = 1, .marked = 1, .bare = true}), 0);
 }
 

@@ -67,7 +67,9 @@ TEST(MuscleLevel, WithoutStrokesOfABoneThereIsNone) {
 
 TEST(WithUsualMuscle, AUsualScanStaysAsItIs) {
   const World world = MakeWorld(0.5, 0.03);
-  EXPECT_TRUE(WithUsualMuscle(world.scan, world.strokes).lent());
+  const UsualMuscle usual = WithUsualMuscle(world.scan, world.strokes);
+  EXPECT_TRUE(usual.scan.lent());
+  EXPECT_EQ(usual.darker, 0);
 }
 
 // In proportion up to muscle; from marrow on nothing changes.
@@ -75,7 +77,9 @@ TEST(WithUsualMuscle, DarkMuscleIsBrighterThenAndMarrowAndFatAreNot) {
   const World world = MakeWorld(0.2, 0.01);
   const double factor = kUsualMuscle / MuscleLevel(world.scan, world.strokes).value();
   EXPECT_NEAR(factor, kUsualMuscle / 0.2, 0.05);
-  const Volume usual = WithUsualMuscle(world.scan, world.strokes).Taken();
+  UsualMuscle as_usual = WithUsualMuscle(world.scan, world.strokes);
+  EXPECT_NEAR(as_usual.darker, 1 - 1 / factor, 1e-12);
+  const Volume usual = std::move(as_usual.scan).Taken();
   for (size_t v = 0; v < usual.values.size(); ++v) {
     const double was = world.scan.values[v] / kMarrow, is = usual.values[v] / kMarrow;
     ASSERT_GE(is, was - 1e-6) << v;

@@ -51,9 +51,8 @@ const char kUnlike[] =
 
 const char kDarkMuscle[] =
     "muscle is nearly as dark as cortex in this scan, so that what was found may well be too large, too "
-    "small "
-    "or beside the bone; look at its borders, draw more strokes in it, and mark the background where it goes "
-    "too far";
+    "small or beside the bone; look at its borders, draw more strokes in it, and mark the background where "
+    "it goes too far";
 
 const char kApart[] =
     "it was found in pieces that do not touch, with strokes of it in more than one of them: a part between "
@@ -65,8 +64,7 @@ const char kWithin[] =
 
 const char kCanal[] =
     "a part of it is as soft as muscle and goes on outside of it, as the spinal canal does, and hardly a "
-    "stroke "
-    "marks it; if it is none of the bone, mark it as background";
+    "stroke marks it; if it is none of the bone, mark it as background";
 
 class Grower {
  public:

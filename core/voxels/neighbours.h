@@ -1,10 +1,13 @@
-// The voxels around one, corner to corner, as far as the grid holds them.
+// The voxels around one: those beside it by faces, or all, corner to corner.
 #pragma once
 #include "core/grid.h"
 
 namespace kvx {
 
-// Calls visit(index) for the voxel and its 26 neighbours, i fastest.
+// To the voxel beside another on one of its six sides: back and forth along i, j, k.
+inline Eigen::Vector3i StepToSide(int side) { return (side % 2 ? 1 : -1) * Eigen::Vector3i::Unit(side / 2); }
+
+// Calls visit(index) for the voxel and its 26 neighbours as far as the grid holds them, i fastest.
 template <class Visit>
 void ForEachAround(const Grid& grid, size_t at, Visit&& visit) {
   const Eigen::Vector3i p = grid.Ijk(at);

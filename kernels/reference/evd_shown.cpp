@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 
+#include "core/voxels/neighbours.h"
 #include "core/voxels/to_corner.h"
 #include "kernels/evd_specks.h"
 #include "kernels/reference/evd.h"
@@ -26,7 +27,7 @@ bool IsInner(const std::vector<Landing>& landings, const Grid& grid, const Vecto
 std::vector<size_t> InnerBeside(const std::vector<Landing>& landings, const Grid& grid, size_t v) {
   std::vector<size_t> out;
   for (int side = 0; side < 6; ++side) {
-    const Vector3i beside = grid.Ijk(v) + (side % 2 ? 1 : -1) * Vector3i::Unit(side / 2);
+    const Vector3i beside = grid.Ijk(v) + StepToSide(side);
     if (IsInner(landings, grid, beside)) out.push_back(grid.Index(beside.x(), beside.y(), beside.z()));
   }
   return out;

@@ -6,6 +6,7 @@
 
 #include "core/errors.h"
 #include "core/host/parallel.h"
+#include "core/voxels/neighbours.h"
 
 namespace kvx {
 namespace {
@@ -68,8 +69,7 @@ std::vector<int32_t> NearestSamples(const Grid& grid, const std::vector<Sample>&
       const size_t node = forth ? n : nearest.size() - 1 - n;
       const Eigen::Vector3i at = grid.Ijk(node);
       for (int side = 0; side < 6; ++side) {
-        Eigen::Vector3i other = at;
-        other[side / 2] += side % 2 ? 1 : -1;
+        const Eigen::Vector3i other = at + StepToSide(side);
         if (!grid.Contains(other)) continue;
         const int32_t sample = nearest[grid.Index(other.x(), other.y(), other.z())];
         if (sample >= 0) changed = offer(node, sample) || changed;

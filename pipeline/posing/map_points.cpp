@@ -6,6 +6,7 @@
 
 #include "core/blend.h"
 #include "core/bone_border.h"
+#include "core/voxels/neighbours.h"
 #include "core/voxels/to_corner.h"
 
 namespace kvx {
@@ -24,8 +25,7 @@ std::vector<int32_t> NearestBricks(const BrickedBody& body) {
   for (; !front.empty(); front.pop_front()) {
     const size_t i = front.front();
     for (int side = 0; side < 6; ++side) {
-      Eigen::Vector3i next = body.BrickPlace(i);
-      next[side / 2] += side % 2 ? 1 : -1;
+      const Eigen::Vector3i next = body.BrickPlace(i) + StepToSide(side);
       if ((next.array() < 0).any() || (next.array() >= n.array()).any()) continue;
       const size_t at = body.BrickIndex(next);
       int32_t& found = nearest[at];

@@ -159,8 +159,7 @@ class Grower {
       if (!ct_) Expect(finishes[b], bones_[b].label, signs_[b]);
       DoubtFinished(finishes[b], bones_[b]);
     }
-    DoubtStrokes();
-    if (ct_) DoubtCanals();
+    DoubtWhatIsThere();
   }
 
   void Expect(const BoneFinish& finish, int label, SearchSigns signs) {
@@ -182,27 +181,24 @@ class Grower {
   }
 
   // Of the bones that were looked for.
-  void DoubtStrokes() {
+  void DoubtWhatIsThere() {
     const std::map<int, size_t> within = StrokesWithin(out_.labels, strokes_);
-    std::vector<size_t> apart(bones_.size());
+    const std::map<int, VoxelBox> boxes = BoxesOf(out_.labels);
+    std::vector<uint8_t> apart(bones_.size(), 0), canal(bones_.size(), 0);
     ParallelFor(bones_.size(), [&](size_t b) {
-      apart[b] = StrokesApart(out_.labels, strokes_, bones_[b].label, bones_[b].box);
+      const int label = bones_[b].label;
+      const auto box = boxes.find(label);
+      if (box == boxes.end()) return;
+      apart[b] = StrokesApart(out_.labels, strokes_, label, box->second) >= kSeveralApart;
+      canal[b] = ct_ && HoldsCanal(scan_, out_.labels, strokes_, label, box->second);
     });
     for (size_t b = 0; b < bones_.size(); ++b) {
       const int label = bones_[b].label;
       const auto other = within.find(label);
-      if (apart[b] >= kSeveralApart && !IsTold(label)) Warn(label, kApart);
+      if (apart[b] && !IsTold(label)) Warn(label, kApart);
       if (other != within.end() && other->second >= kSeveralWithin) Warn(label, kWithin);
+      if (canal[b]) Warn(label, kCanal);
     }
-  }
-
-  void DoubtCanals() {
-    std::vector<uint8_t> canal(bones_.size());
-    ParallelFor(bones_.size(), [&](size_t b) {
-      canal[b] = HoldsCanal(scan_, out_.labels, strokes_, bones_[b].label, bones_[b].box);
-    });
-    for (size_t b = 0; b < bones_.size(); ++b)
-      if (canal[b]) Warn(bones_[b].label, kCanal);
   }
 
   // What another bone took meanwhile stays there.

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/host/parallel.h"
+#include "core/voxels/neighbours.h"
 
 namespace kvx {
 namespace {
@@ -69,8 +70,7 @@ Level FinestLevel(const RoleMap& roles, std::vector<Anchor>& anchors) {
   for (size_t n = 0; n < level.cell.size(); ++n) {
     const Eigen::Vector3i p = IjkOf(level.size, level.cell[n]);
     for (int d = 0; d < 6; ++d) {
-      Eigen::Vector3i q = p;
-      q[d / 2] += d % 2 ? 1 : -1;
+      const Eigen::Vector3i q = p + StepToSide(d);
       if (!roles.grid.Contains(q)) continue;
       const uint32_t beside = CellOf(level.size, q);
       const float conductance = float(level.along[d / 2]);

@@ -22,6 +22,7 @@ from scipy import ndimage
 AIR_HU, FAT_HU, SOFT_HU, TABLE_HU, CAST_HU = -1000, -100, 40, 1000, 1000
 STORED_ABOVE_HU = 1024
 MARGIN = 16
+WRIST = (200, 230, 274)  # voxels
 
 
 def crop(shared, name, flipped):
@@ -111,6 +112,14 @@ def coarser(greys, labels, factor):
     return blocks, labels[middle::factor, middle::factor, middle::factor]
 
 
+def wrist(bones, apart):
+    placed = [(*bones["rad"], (60, 70, 0))]
+    for name, at, step in (("uln", (65, 185, 0), (0, -1, 0)), ("mc2_mc3", (62, 60, 150), (0, 0, -1))):
+        labels = bones[name][1]
+        placed.append((*bones[name], pushed(placed, WRIST, labels, at, np.array(step), apart)))
+    return placed
+
+
 def scenes(shared):
     bones = {name: crop(shared, name, flipped=name in ("rad", "uln")) for name in ("rad", "uln", "mc3", "mc2_mc3")}
     spacing = bones["rad"][2]
@@ -124,13 +133,9 @@ def scenes(shared):
         shape = tuple(np.array(labels.shape) + (2 * MARGIN, 2 * MARGIN, 8))
         yield f"{name}, noise 80 HU", *scene([(hu, labels, (MARGIN, MARGIN, 0))], shape, 80, 9), spacing
     for apart in (2, 4):
-        shape, placed = (200, 230, 274), [(*bones["rad"], (60, 70, 0))]
-        for name, at, step in (("uln", (65, 185, 0), (0, -1, 0)), ("mc2_mc3", (62, 60, 150), (0, 0, -1))):
-            labels = bones[name][1]
-            placed.append((*bones[name], pushed(placed, shape, labels, at, np.array(step), apart)))
-        yield f"wrist, {apart} voxels apart", *scene(placed, shape, 25, apart), spacing
+        yield f"wrist, {apart} voxels apart", *scene(wrist(bones, apart), WRIST, 25, apart), spacing
     for add in (on_a_table, in_a_cast):
-        yield f"wrist, {add.__name__.replace('_', ' ')}", *scene(placed, shape, 25, 4, spacing, add), spacing
+        yield f"wrist, {add.__name__.replace('_', ' ')}", *scene(wrist(bones, 4), WRIST, 25, 4, spacing, add), spacing
 
 
 def dice(truth, found):

@@ -7,12 +7,14 @@
 
 #include "core/voxels/components.h"
 #include "core/voxels/dilated.h"
+#include "core/voxels/neighbours.h"
 #include "pipeline/scans/coarser.h"
+#include "pipeline/segmentation/ct/ct_outside.h"
 
 namespace kvx {
 namespace {
 
-constexpr float kSoftHu = 60, kAirHu = -300;
+constexpr float kSoftHu = 60;
 constexpr float kFatHu = -30;        // less in the mean: marrow of a shaft
 constexpr double kBallMm = 3;        // of radius: does not fit into spongy bone's gaps
 constexpr double kLeast = 0.03;      // of the bone
@@ -73,7 +75,7 @@ class SoftParts {
     const Eigen::Vector3i p = grid.Ijk(v);
     for (int way = 0; way < 6; ++way) {
       const int axis = way / 2;
-      const Eigen::Vector3i q = p + (way % 2 ? 1 : -1) * Eigen::Vector3i::Unit(axis);
+      const Eigen::Vector3i q = p + StepToSide(way);
       const double face_mm2 = grid.spacing_mm.prod() / grid.spacing_mm[axis];
       const bool inside = grid.Contains(q);
       const size_t next = inside ? grid.Index(q.x(), q.y(), q.z()) : v;
@@ -81,7 +83,7 @@ class SoftParts {
       part.surface_mm2 += face_mm2;
       if (!inside)
         part.cut_mm2[size_t(way)] += face_mm2;
-      else if (!bone_.values[next] && soft_.values[next] && hu_.values[next] > kAirHu)
+      else if (!bone_.values[next] && soft_.values[next] && hu_.values[next] > kThinnestHu)
         part.open_mm2 += face_mm2;
     }
   }
@@ -96,12 +98,7 @@ class SoftParts {
 
 bool HoldsCanal(const Volume& scan_hu, const LabelMap& labels, const LabelMap& strokes, int label,
                 const VoxelBox& box) {
-  VoxelBox bone;
-  ForEachVoxel(box, [&](const Eigen::Vector3i& p) {
-    if (labels(p.x(), p.y(), p.z()) == label) bone.Include(p);
-  });
-  if (bone.empty()) return false;
-  const VoxelBox around = bone.Grown(Eigen::Vector3i::Constant(2), scan_hu.grid);
+  const VoxelBox around = box.Grown(Eigen::Vector3i::Constant(2), scan_hu.grid);
   const BlockedBox part{around, BlocksFor(around, scan_hu.grid, kMostBlocks).back()};
   return SoftParts(Coarser(scan_hu, part), Coarser(labels, part, label), Coarser(strokes, part, label), label)
       .AnyIsCanal();

@@ -10,7 +10,6 @@
 namespace kvx {
 namespace {
 
-constexpr float kAirHu = -300;    // no marrow is as thin
 constexpr float kDenseHu = 140;   // denser than soft tissue; a thin shell in thick slices is hardly more
 constexpr double kBallMm = 8;     // does not get through the gaps of a shell
 constexpr double kSpeckMm3 = 50;  // noise and small calcifications are no shell
@@ -37,7 +36,7 @@ Mask OutsideOfBones(const Volume& scan_hu) {
   for (size_t v = 0; v < outside.values.size(); ++v) outside.values[v] = distance_mm.values[v] > ball_mm;
   const Components pieces = LabelComponents(outside);
   Mask air(scan_hu.grid);
-  for (size_t v = 0; v < air.values.size(); ++v) air.values[v] = scan_hu.values[v] < kAirHu;
+  for (size_t v = 0; v < air.values.size(); ++v) air.values[v] = scan_hu.values[v] < kThinnestHu;
   return MaskOf(pieces, PiecesWith(pieces, air));
 }
 

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "core/voxels/components.h"
-#include "core/voxels/grid_lines.h"
 #include "core/voxels/neighbours.h"
 #include "pipeline/scans/grey_kind.h"
 #include "pipeline/segmentation/ct/neck_parts.h"
@@ -23,15 +22,12 @@ struct WayDown {
   double mm;
 };
 
-double StepMm(const Grid& grid, size_t v, size_t beside) {
-  return (grid.Ijk(beside) - grid.Ijk(v)).cast<double>().cwiseProduct(grid.spacing_mm).norm();
-}
-
 WayDown SteepestFrom(const Volume& scan_hu, size_t v) {
+  const Grid& grid = scan_hu.grid;
   WayDown steepest{v, 0};
   double most = 0;  // HU per mm
-  ForEachNeighbour(scan_hu.grid, v, [&](size_t beside) {
-    const double mm = StepMm(scan_hu.grid, v, beside);
+  ForEachNeighbour(grid, v, [&](size_t beside) {
+    const double mm = (grid.Ijk(beside) - grid.Ijk(v)).cast<double>().cwiseProduct(grid.spacing_mm).norm();
     const double fall = double(scan_hu.values[v] - scan_hu.values[beside]) / mm;
     if (fall > most) most = fall, steepest = {beside, mm};
   });
@@ -51,13 +47,19 @@ bool FallsToAir(const Volume& scan_hu, size_t v, double within_mm) {
 // Per piece.
 std::vector<uint8_t> LieInAir(const Volume& scan_hu, const Components& pieces) {
   std::vector<size_t> faces(pieces.voxels.size(), 0), in_air(pieces.voxels.size(), 0);
-  const auto look = [&](size_t inside, size_t outside) {
-    const int32_t piece = pieces.piece.values[inside];
-    if (piece < 0 || pieces.piece.values[outside] >= 0) return;
-    ++faces[size_t(piece)];
-    in_air[size_t(piece)] += FallsToAir(scan_hu, outside, kEdgeMm - StepMm(scan_hu.grid, inside, outside));
-  };
-  ForEachPair(scan_hu.grid, [&](size_t v, size_t next) { look(v, next), look(next, v); });
+  const Grid& grid = scan_hu.grid;
+  for (size_t v = 0; v < scan_hu.values.size(); ++v) {
+    const int32_t piece = pieces.piece.values[v];
+    if (piece < 0) continue;
+    for (int side = 0; side < 6; ++side) {
+      const Eigen::Vector3i beside = grid.Ijk(v) + StepToSide(side);
+      if (!grid.Contains(beside)) continue;
+      const size_t outside = grid.Index(beside.x(), beside.y(), beside.z());
+      if (pieces.piece.values[outside] >= 0) continue;
+      ++faces[size_t(piece)];
+      in_air[size_t(piece)] += FallsToAir(scan_hu, outside, kEdgeMm - grid.spacing_mm[side / 2]);
+    }
+  }
   std::vector<uint8_t> lie_in_air;
   for (size_t p = 0; p < faces.size(); ++p)
     lie_in_air.push_back(double(in_air[p]) > kMostOfSurface * double(faces[p]));

@@ -37,7 +37,7 @@ std::array<int, 6> LabelsAround(const LabelMap& labels, const LabelMap& strokes,
   std::array<int, 6> around{};
   const uint16_t stroke = strokes(at.x(), at.y(), at.z());
   for (int way = 0; way < 6; ++way) {
-    const Eigen::Vector3i step = (way % 2 ? 1 : -1) * Eigen::Vector3i::Unit(way / 2);
+    const Eigen::Vector3i step = StepToSide(way);
     Eigen::Vector3i p = at + step;
     while (strokes.grid.Contains(p) && strokes(p.x(), p.y(), p.z()) == stroke) p += step;
     if (strokes.grid.Contains(p)) around[size_t(way)] = labels(p.x(), p.y(), p.z());
@@ -47,7 +47,7 @@ std::array<int, 6> LabelsAround(const LabelMap& labels, const LabelMap& strokes,
 
 bool IsBesideABone(const LabelMap& labels, const Eigen::Vector3i& at, int but) {
   for (int way = 0; way < 6; ++way) {
-    const Eigen::Vector3i p = at + (way % 2 ? 1 : -1) * Eigen::Vector3i::Unit(way / 2);
+    const Eigen::Vector3i p = at + StepToSide(way);
     if (!labels.grid.Contains(p)) continue;
     const int label = labels(p.x(), p.y(), p.z());
     if (label != 0 && label != but) return true;

@@ -5,6 +5,7 @@
 
 #include "pipeline/segmentation/grow_bones.h"
 #include "pipeline/segmentation/strokes/carried_strokes.h"
+#include "tests/support/plain_grid.h"
 
 namespace kvx {
 namespace {
@@ -12,9 +13,7 @@ namespace {
 constexpr double kMarrow = 160, kCortex = 15, kMiddle = 85;
 
 GrownBones BonesWhereMuscleHas(double grey) {
-  Grid grid;
-  grid.size = {40, 40, 40};
-  grid.spacing_mm = {1.5, 1.5, 1.5};
+  const Grid grid = testing_support::Cubes({40, 40, 40}, 1.5);
   Volume scan(grid);
   LabelMap strokes(grid);
   std::mt19937 random(3);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/errors.h"
+#include "core/voxels/neighbours.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -127,8 +128,7 @@ TEST(ComputeWeights, NarrowGapsBetweenBonesAreHarmonicAndSoAreThickSlices) {
           if (world.bones.labels(i, j, k) != 0) continue;
           double sum = 0, count = 0;
           for (int side = 0; side < 6; ++side) {
-            const Eigen::Vector3i p =
-                Eigen::Vector3i(i, j, k) + (side % 2 ? 1 : -1) * Eigen::Vector3i::Unit(side / 2);
+            const Eigen::Vector3i p = Eigen::Vector3i(i, j, k) + StepToSide(side);
             const double share = (side / 2 == 2 ? 1 / (thickness * thickness) : 1) *
                                  (world.bones.labels(p.x(), p.y(), p.z()) != 0 ? 2 : 1);
             sum += share * WeightOf(weights(p.x(), p.y(), p.z()), 1), count += share;

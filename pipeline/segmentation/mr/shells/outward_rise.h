@@ -2,6 +2,7 @@
 #pragma once
 #include <algorithm>
 
+#include "core/voxels/neighbours.h"
 #include "core/voxels/voxel_box.h"
 
 namespace kvx {
@@ -30,8 +31,7 @@ void ForEachSurfaceFace(const Volume& scan, const VoxelBox& box, const Mask& mas
   ForEachVoxel(box, scan.grid, [&](const Eigen::Vector3i& p, size_t part, size_t whole) {
     if (!mask.values[part]) return;
     for (int side = 0; side < 6; ++side) {
-      const Eigen::Vector3i step = (side % 2 ? 1 : -1) * Eigen::Vector3i::Unit(side / 2);
-      const Eigen::Vector3i next = p + step, out = next + box.low;
+      const Eigen::Vector3i next = p + StepToSide(side), out = next + box.low;
       if (!scan.grid.Contains(out)) continue;
       if (mask.grid.Contains(next) && mask(next.x(), next.y(), next.z())) continue;
       visit(part, double(scan(out.x(), out.y(), out.z())) - scan.values[whole]);

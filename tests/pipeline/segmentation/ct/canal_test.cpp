@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/segmentation/strokes/carried_strokes.h"
+#include "tests/support/plain_grid.h"
 
 namespace kvx {
 namespace {
@@ -20,9 +20,7 @@ struct Body {
 
 // The bone's label has what is in `part` of it, too. `slices`: of the view.
 Body Pierced(const VoxelBox& part, float hu, int slices = 26) {
-  Grid grid;
-  grid.size = {32, 32, slices};
-  grid.spacing_mm = {1.5, 1.5, 2};
+  const Grid grid = testing_support::PlainGrid({32, 32, slices}, {1.5, 1.5, 2}, {0, 0, 0});
   Body body{Volume(grid, kMuscleHu), LabelMap(grid), LabelMap(grid)};
   const VoxelBox bone{kBone.low.cwiseMin(part.low), kBone.high.cwiseMax(part.high).cwiseMin(grid.size)};
   ForEachVoxel(bone, [&](const Voxel& p) {
@@ -33,7 +31,7 @@ Body Pierced(const VoxelBox& part, float hu, int slices = 26) {
 }
 
 bool HasCanal(const Body& body) {
-  return HoldsCanal(body.scan, body.labels, body.strokes, 3, {{0, 0, 0}, body.scan.grid.size});
+  return HoldsCanal(body.scan, body.labels, body.strokes, 3, BoxOf(body.labels, 3));
 }
 
 TEST(HoldsCanal, ATubeThatLeadsOutOfTheBoneIsOne) {

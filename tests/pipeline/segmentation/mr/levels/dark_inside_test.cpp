@@ -3,17 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/plain_grid.h"
+
 namespace kvx {
 namespace {
 
 constexpr float kMarrow = 200;
 const VoxelBox kBone{{3, 4, 5}, {13, 14, 15}};
 
-Volume Bright() {
-  Grid grid;
-  grid.size = {20, 20, 20};
-  return Volume(grid, kMarrow);
-}
+Volume Bright() { return Volume(testing_support::Cubes({20, 20, 20}, 1), kMarrow); }
 
 void Fill(Volume& scan, const VoxelBox& box, float grey) {
   ForEachVoxel(box, [&](const Eigen::Vector3i& p) { scan(p.x(), p.y(), p.z()) = grey; });

@@ -5,14 +5,15 @@
 
 #include <random>
 
+#include "tests/support/plain_grid.h"
+
 namespace kvx {
 namespace {
 
 // A change between samples half a voxel apart is an edge when it is half of one between voxels, and so is
 // noise.
 TEST(StrokeBone, NoiseOfARefinedSearchIsHalfThatOfTheVoxels) {
-  Grid grid;
-  grid.size = {18, 18, 18};
+  const Grid grid = testing_support::Cubes({18, 18, 18}, 1);
   Volume scan(grid);
   LabelMap strokes(grid);
   std::mt19937 random(3);

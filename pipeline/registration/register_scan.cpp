@@ -101,6 +101,7 @@ RegisteredScan RegisterAdaptively(const RegistrationInputs& inputs, const Eigen:
     scan_mm = StartAfter(scan_mm, region, field);
     if (last) {
       levels.front().weight = std::move(weights);
+      left_open.slopes = SharedSlopesOfBlocks(levels.front(), scan_mm);
       left_open.disagreement = DisagreementAround(levels.front(), scan_mm);
       break;
     }

@@ -9,7 +9,10 @@
 #include "core/host/parallel.h"
 #include "core/numbers/quantile.h"
 #include "core/voxels/nearest_voxel.h"
+#include "core/voxels/sample_clamped.h"
+#include "core/voxels/voxel_box.h"
 #include "pipeline/registration/region/blend_table.h"
+#include "pipeline/registration/result/carried_place.h"
 #include "pipeline/registration/result/nearest_bones.h"
 #include "pipeline/scans/grey_kind.h"
 #include "pipeline/skeleton/bone_certainty.h"
@@ -112,6 +115,48 @@ class SlipBesideCoats {
   std::vector<uint32_t> nearest_free_;
 };
 
+// How far tissue lies from where the bones alone would put it, mm; not a number outside the body.
+class WayFromSkinned {
+ public:
+  WayFromSkinned(const RegistrationInputs& inputs, const WorkRegion& region, const PoseVector& pose,
+                 const std::vector<Eigen::Vector3f>& scan_mm)
+      : body_(*inputs.body), weights_(*inputs.weights), skinned_(pose), region_(region), scan_mm_(scan_mm) {}
+
+  // Of a voxel of the region.
+  Eigen::Vector3d operator()(const Eigen::Vector3i& voxel) const {
+    const Eigen::Vector3i at = voxel + region_.first;
+    if (!body_.grid.Contains(at) || !body_(at.x(), at.y(), at.z()))
+      return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+    const Eigen::Vector3d x = body_.grid.ToMm(PointVox{at.cast<double>()}).lps;
+    return scan_mm_[region_.grid.Index(voxel.x(), voxel.y(), voxel.z())].cast<double>() -
+           Apply(skinned_(weights_(at.x(), at.y(), at.z())), x);
+  }
+  // On average over every other voxel of the block.
+  Image<Eigen::Vector3f> OfBlocks(const Grid& blocks) const {
+    Image<Eigen::Vector3f> out(blocks);
+    ParallelEach(out.values.size(), [&](size_t b) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      double count = 0;
+      const VoxelBox halved{Eigen::Vector3i::Zero(), Eigen::Vector3i::Constant(kBlockVoxels / 2)};
+      ForEachVoxel(halved, [&](const Eigen::Vector3i& voxel) {
+        const Eigen::Vector3i at = kBlockVoxels * blocks.Ijk(b) + 2 * voxel;
+        if (!region_.grid.Contains(at)) return;
+        const Eigen::Vector3d way_mm = (*this)(at);
+        if (way_mm.allFinite()) sum += way_mm, count += 1;
+      });
+      out.values[b] = (sum / count).cast<float>();  // not a number without any
+    });
+    return out;
+  }
+
+ private:
+  const Mask& body_;
+  const WeightMap& weights_;
+  BlendTable skinned_;
+  const WorkRegion& region_;
+  const std::vector<Eigen::Vector3f>& scan_mm_;
+};
+
 // By how much variances are greater because the images disagree; at least 1.
 class ImageDoubt {
  public:
@@ -146,7 +191,8 @@ Mask PlaceErrorSteps(const RegistrationInputs& inputs, const LevelImages& images
   const Grid& cells = left_open.disagreement.grid;
   const double voxel_mm = region.grid.spacing_mm.maxCoeff();
   const PoseVector pose = PoseOf(*inputs.fits);
-  const BlendTable skinned(pose);
+  const WayFromSkinned way(inputs, region, pose, scan_mm);
+  const Volume carried_mm2 = CarriedVariancesMm2(left_open.slopes, way.OfBlocks(left_open.slopes.grid));
   const BetweenBones between(*inputs.bones, region, pose);
   const SlipBesideCoats slip(images, region, scan_mm);
   const ImageDoubt doubt(left_open.disagreement);
@@ -157,15 +203,15 @@ Mask PlaceErrorSteps(const RegistrationInputs& inputs, const LevelImages& images
     const Eigen::Vector3i p = body.grid.Ijk(v) - region.first, c = p / 2;
     const size_t at = region.grid.Index(p.x(), p.y(), p.z());
     if (!ScanShows(images, PointMm{scan_mm[at].cast<double>()})) return;
-    const VoxelWeights& weights = inputs.weights->values[v];
-    const size_t b = weights.bones[0];  // the largest weight is the first
+    const size_t b = inputs.weights->values[v].bones[0];  // the largest weight is the first
     const BoneFit& bone = (*inputs.fits)[b];
     const Eigen::Vector3d x = body.grid.ToMm(PointVox{body.grid.Ijk(v).cast<double>()}).lps;
-    const double way_mm = kErrorPerMoved * (scan_mm[at].cast<double>() - Apply(skinned(weights), x)).norm();
+    const double way_mm = kErrorPerMoved * way(p).norm();
     const bool soft = !inputs.bones->labels.values[v];
     const double between_mm = soft ? between(c, PointMm{x}) : 0;
     const double free = FreedomBesideBone(images.beyond_coat_mm.values[at], voxel_mm);
-    const double of_images = left_open.variances_mm2[cells.Index(c.x(), c.y(), c.z())];
+    const double of_images = left_open.variances_mm2[cells.Index(c.x(), c.y(), c.z())] +
+                             SampleClamped(carried_mm2, carried_mm2.grid.ToVox(PointMm{x}));
     const double slip_mm = soft && free < 1 ? kErrorPerSlip / kDeviations * slip(at, pose[b]) : 0;
     const double of_tissue = (free > 0 ? free * (of_images + way_mm * way_mm) : 0) +
                              (1 - free) * slip_mm * slip_mm + between_mm * between_mm;

@@ -24,14 +24,13 @@ struct OneBone {
     bones.labels = LabelMap(grid);
     fits[0].covariance(2, 2) = 0.1 * 0.1;
   }
-  // `free`: soft tissue far from bone, which the images leave nothing open of.
+  // `free`: soft tissue far from bone, which the images leave nothing open of, or of which they show nothing.
   // `disagreement`: of the images in the middle of the body, and elsewhere; 1 is what well registered tissue
   // has.
   Mask Steps(bool free, const Eigen::Vector3d& moved_mm = {0, 0, 0}, float disagreement = 1,
              float elsewhere = 1) const {
     const WorkRegion region = RegionAround(body);
-    const Grid cells = Coarsened(region.grid, 2);
-    LeftOpen nothing_open = NothingOpen(cells, elsewhere);
+    LeftOpen nothing_open = NothingOpen(region, elsewhere);
     const Eigen::Vector3i middle = (Eigen::Vector3i(12, 12, 12) - region.first) / 2;
     nothing_open.disagreement(middle.x(), middle.y(), middle.z()) = disagreement;
     return Steps(region, Volume(region.grid, free ? 1e3f : 0.0f), nothing_open,
@@ -41,7 +40,7 @@ struct OneBone {
   template <class Motion>
   Mask Steps(const Volume& beyond_coat_mm, const Motion& motion) const {
     const WorkRegion region = RegionAround(body);
-    return Steps(region, beyond_coat_mm, NothingOpen(Coarsened(region.grid, 2), 1), motion);
+    return Steps(region, beyond_coat_mm, NothingOpen(region, 1), motion);
   }
 
   Grid grid;
@@ -49,10 +48,15 @@ struct OneBone {
   BoneSet bones;
   BoneFits fits{1};
   std::string template_modality, scan_modality;
+  bool images_show = true;  // where tissue lies
 
  private:
-  static LeftOpen NothingOpen(const Grid& cells, float disagreement) {
-    return {std::vector<float>(cells.VoxelCount(), 0.0f), Volume(cells, disagreement)};
+  LeftOpen NothingOpen(const WorkRegion& region, float disagreement) const {
+    const Grid cells = Coarsened(region.grid, 2);
+    SharedSlopes known;
+    known.products = 1e9 * Eigen::Matrix3d::Identity(), known.weight = images_show ? 1 : 0;
+    return {std::vector<float>(cells.VoxelCount(), 0.0f), Volume(cells, disagreement),
+            Image<SharedSlopes>(Coarsened(region.grid, kBlockVoxels), known)};
   }
   template <class Motion>
   Mask Steps(const WorkRegion& region, const Volume& beyond_coat_mm, const LeftOpen& left_open,
@@ -139,6 +143,17 @@ TEST(PlaceErrorSteps, OfSoftTissueGrowWhereTheImagesDisagree) {
   EXPECT_NEAR(bone.Steps(true, moved_mm, 12, 12)(12, 12, 12), stated_mm / kPlaceErrorStepMm, 1)
       << "all alike";
   EXPECT_EQ(bone.Steps(false, {0, 0, 0}, 12).values, bone.Steps(false).values);
+}
+
+// A fixed part of how far tissue moves in this scan is added to the part of the way that counts in any case,
+// both as squares; bones are known by their own evidence.
+TEST(PlaceErrorSteps, OfSoftTissueGrowWhereTheImagesShowNothing) {
+  OneBone bone({0, 0, 0});
+  bone.images_show = false;
+  const Mask steps = bone.Steps(true, {0, 0, 20});
+  EXPECT_NEAR(steps(12, 12, 12), kStatedDeviations * 20 * std::sqrt(0.06 + 0.07 * 0.07) / kPlaceErrorStepMm,
+              1);
+  EXPECT_EQ(bone.Steps(false).values, OneBone({0, 0, 0}).Steps(false).values);
 }
 
 // 1.7 times; bones are known by their own evidence.

@@ -150,8 +150,8 @@ TEST(PlaceErrorSteps, OfSoftTissueGrowWhereTheImagesDisagree) {
 TEST(PlaceErrorSteps, OfSoftTissueGrowWhereTheImagesShowNothing) {
   OneBone bone({0, 0, 0});
   bone.images_show = false;
-  const Mask steps = bone.Steps(true, {0, 0, 20});
-  EXPECT_NEAR(steps(12, 12, 12), kStatedDeviations * 20 * std::sqrt(0.06 + 0.07 * 0.07) / kPlaceErrorStepMm,
+  const Mask steps = bone.Steps(true, {0, 0, 10});
+  EXPECT_NEAR(steps(12, 12, 12), kStatedDeviations * 10 * std::sqrt(0.3 + 0.07 * 0.07) / kPlaceErrorStepMm,
               1);
   EXPECT_EQ(bone.Steps(false).values, OneBone({0, 0, 0}).Steps(false).values);
 }

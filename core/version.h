@@ -3,6 +3,6 @@
 
 namespace kvx {
 
-const char* ProgramVersion();  // "0.98.0"
+const char* ProgramVersion();  // "0.99.0"
 
 }  // namespace kvx

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/host/parallel.h"
+#include "core/voxels/gaussian_blur.h"
 #include "kernels/block_kernels.h"
 #include "pipeline/registration/blocks/block_information.h"
 #include "pipeline/registration/blocks/block_scale.h"
@@ -23,6 +24,9 @@ constexpr double kLeastStepVoxels = 0.03;  // below this a step is not worth its
 constexpr int kHalvings = 1;  // of steps that turn out to make things worse; then they are dropped
 
 constexpr size_t kVariancesBatch = 512;  // blocks whose equations are held at once: 1 MiB
+
+// Standard deviation of what counts as about a cell: of a wave of a block's width it leaves a sixteenth.
+constexpr double kAboutCells = 1.5;
 
 // The cells of a block itself, counted from its support's first.
 struct Middle {
@@ -76,18 +80,22 @@ class Sweeper {
 
   // The last thing to ask for.
   std::vector<FieldVector> TakeField() { return kernels_.TakeField(); }
-  // Per cell, the mean of the two blocks whose middle it lies in.
+  // Per cell, the mean of the two blocks whose middle it lies in, and of those about: whether a cell lies
+  // amid its control points or beside one is of the lattice's making.
   std::vector<float> VariancesMm2() {
     kernels_.Linearise();
-    std::vector<float> sum(level_.stiffness.size(), 0), count(sum.size(), 0);
+    Volume sum(Coarsened(level_.grid, 2)), count(sum.grid);
     for (const int shifted : {0, 1}) {
       const auto& blocks = own_.lattice.blocks(shifted);
       for (size_t first = 0; first < blocks.size(); first += kVariancesBatch)
         AddVariances(std::span(blocks).subspan(first, std::min(kVariancesBatch, blocks.size() - first)), sum,
                      count);
     }
-    for (size_t c = 0; c < sum.size(); ++c) sum[c] = count[c] > 0 ? sum[c] / count[c] : kNotKnown;
-    return sum;
+    const std::vector<float> own_count = count.values;
+    for (Volume* volume : {&sum, &count}) GaussianBlur(*volume, Eigen::Vector3d::Constant(kAboutCells));
+    for (size_t c = 0; c < own_count.size(); ++c)
+      sum.values[c] = own_count[c] > 0 ? sum.values[c] / count.values[c] : kNotKnown;
+    return std::move(sum.values);
   }
 
   int64_t registered() const { return int64_t(registered_.size()); }
@@ -106,12 +114,11 @@ class Sweeper {
   };
 
   // Blocks of one lattice: no cell is in the middle of two.
-  void AddVariances(std::span<const BlockLattice::Block> blocks, std::vector<float>& sum,
-                    std::vector<float>& count) {
+  void AddVariances(std::span<const BlockLattice::Block> blocks, Volume& sum, Volume& count) {
     std::vector<cl_int4> supports;
     for (const auto& block : blocks) supports.push_back(block.support);
     const std::vector<float> equations = kernels_.Equations(supports);
-    const Grid cells = Coarsened(level_.grid, 2);
+    const Grid& cells = sum.grid;
     ParallelEach(blocks.size(), [&](size_t b) {
       const auto own = std::span(equations).subspan(b * kEquationValues, kEquationValues);
       const std::vector<float> variances =
@@ -121,7 +128,7 @@ class Sweeper {
             Eigen::Map<const Eigen::Vector3i>(blocks[b].support.s) / 2 + middle_.cells[n];
         if (!cells.Contains(p)) continue;
         const size_t c = cells.Index(p.x(), p.y(), p.z());
-        sum[c] += variances[n], count[c] += 1;
+        sum.values[c] += variances[n], count.values[c] += 1;
       }
     });
   }

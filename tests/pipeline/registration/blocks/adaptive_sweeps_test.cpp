@@ -112,5 +112,28 @@ TEST(RegisterLevel, WideBlocksTakeUpLongWavesSooner) {
   EXPECT_LT(wide, 0.8 * narrow) << narrow;
 }
 
+// Waves of eight voxels along every axis show each block of either lattice the same, so that every cell of
+// the middle is known as well as the others, wherever in its blocks it lies.
+TEST(RegisterLevel, VariancesDoNotShowTheLattice) {
+  BlockLevel level = MovedByALongWave(48);
+  for (size_t v = 0; v < level.grid.VoxelCount(); ++v) {
+    const Eigen::Array3d phase = level.grid.Ijk(v).cast<double>().array() * (kPi / 4);
+    level.intensity[v] = level.scan.values[v] = float(phase.sin().sum());
+  }
+  level.bending = 30;
+  std::vector<FieldVector> field(level.grid.VoxelCount(), FieldVector::Zero());
+  const std::vector<float> variances_mm2 =
+      RegisterLevel(level, SharedBackend(), {}, {1, 0}, true, field).variances_mm2;
+  const Grid cells = Coarsened(level.grid, 2);
+  float least = kNotKnown, most = 0;
+  for (size_t c = 0; c < cells.VoxelCount(); ++c) {
+    const Eigen::Vector3i p = cells.Ijk(c);
+    if (p.minCoeff() < 10 || p.maxCoeff() >= 14) continue;
+    least = std::min(least, variances_mm2[c]), most = std::max(most, variances_mm2[c]);
+  }
+  EXPECT_GT(least, 0);
+  EXPECT_LT(most, 1.03f * least);
+}
+
 }  // namespace
 }  // namespace kvx

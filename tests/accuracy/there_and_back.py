@@ -4,13 +4,13 @@ that went there and came back, beside what both registrations state.
 
     tests/accuracy/there_and_back.py STUDY/study.json [--scan pose1] [--work WORK] [--kinevox build/bin/kinevox]
 
-Two models are built below WORK: of the template and the scan, and of both with the scan as template, whose label map is
-the first model's bones, posed. Every other voxel along each axis of the first template goes through both. Printed: how
-far from where it began it ends (mean, median, 95th percentile), the mean of what is stated (of both as squares), and
-the shares within that (two of three are promised) and within twice that (nineteen of twenty); of bone, of soft tissue
-by what either confidence is at least, and of soft tissue of 50 % and more by the distance from the end of the scan's
-view. It is the least that tissue may be off: errors that both registrations have in common do not show, and of
-phantoms they are the larger part. Needs numpy, scipy and nibabel.
+The study has a label map. Two models are built below WORK: of the template and the scan, and of both with the scan as
+template, whose label map is the first model's bones, posed. Every other voxel along each axis of the first template
+goes through both. Printed: how far from where it began it ends (mean, median, 95th percentile), the mean of what is
+stated (of both as squares), and the shares within that (two of three are promised) and within twice that (nineteen of
+twenty); of bone, of soft tissue by what both confidences are at least, and of soft tissue of 50 % and more by the
+distance from the end of the scan's view. It is the least that tissue may be off: errors that both registrations have
+in common do not show, and in phantoms they are more than half of it. Needs numpy, scipy and nibabel.
 """
 import argparse
 import json
@@ -50,7 +50,7 @@ def labels_on_scan(program, model, scan, volume, out):
     places = nibabel.affines.apply_affine(np.linalg.inv(posed.affine) @ image.affine, voxels)
     nearest = np.rint(places).astype(int)
     inside = ((nearest >= 0) & (nearest < posed.shape)).all(1)
-    labels = np.zeros(len(voxels), np.uint8)
+    labels = np.zeros(len(voxels), posed.get_data_dtype())
     labels[inside] = np.asarray(posed.dataobj)[tuple(nearest[inside].T)]
     nibabel.save(nibabel.Nifti1Image(labels.reshape(image.shape), image.affine), out)
 

@@ -4,6 +4,8 @@
 #include <limits>
 
 #include "core/host/parallel.h"
+#include "core/voxels/voxel_box.h"
+#include "pipeline/registration/images/shown_voxels.h"
 
 namespace kvx {
 namespace {
@@ -16,9 +18,8 @@ Eigen::Matrix3d Symmetric(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 std::vector<float> SeenOf(const BlockLevel& level, std::span<const Eigen::Vector3f> scan_mm) {
   std::vector<float> seen(scan_mm.size(), std::numeric_limits<float>::quiet_NaN());
   ParallelEach(seen.size(), [&](size_t v) {
-    if (level.weight[v] <= 0) return;
-    const PointVox p = level.scan.grid.ToVox(PointMm{scan_mm[v].cast<double>()});
-    if (level.scan.grid.Contains(p)) seen[v] = SampleTrilinear(level.scan, p);
+    if (const std::optional<PointVox> p = ShownAt(level, scan_mm, v))
+      seen[v] = SampleTrilinear(level.scan, *p);
   });
   return seen;
 }
@@ -57,23 +58,19 @@ Image<SharedSlopes> SharedSlopesOfBlocks(const BlockLevel& level, std::span<cons
   const Eigen::Matrix3d mm_from_slopes = grid.VoxFromMm().transpose();
   Image<SharedSlopes> out(Coarsened(grid, kBlockVoxels));
   ParallelEach(out.values.size(), [&](size_t block) {
-    const Eigen::Vector3i first = (kBlockVoxels * out.grid.Ijk(block)).cwiseMax(1);
-    const Eigen::Vector3i end =
-        (kBlockVoxels * (out.grid.Ijk(block).array() + 1)).min(grid.size.array() - 1).matrix();
+    const Eigen::Vector3i first = kBlockVoxels * out.grid.Ijk(block);
+    const VoxelBox with_neighbours{first.cwiseMax(1),
+                                   (first.array() + kBlockVoxels).min(grid.size.array() - 1).matrix()};
     SharedSlopes& sum = out.values[block];
-    for (int k = first.z(); k < end.z(); ++k) {
-      for (int j = first.y(); j < end.y(); ++j) {
-        for (int i = first.x(); i < end.x(); ++i) {
-          const size_t v = grid.Index(i, j, k);
-          if (level.weight[v] <= 0) continue;
-          const Eigen::Vector3d s = mm_from_slopes * SlopeAt(seen, grid, v);
-          if (!s.allFinite()) continue;
-          const Eigen::Vector3d t = mm_from_slopes * SlopeAt(level.intensity, grid, v);
-          const double w = level.weight[v];
-          sum += {w * Symmetric(s, t), w * t, w * s, w};
-        }
-      }
-    }
+    ForEachVoxel(with_neighbours, [&](const Eigen::Vector3i& p) {
+      const size_t v = grid.Index(p.x(), p.y(), p.z());
+      if (level.weight[v] <= 0) return;
+      const Eigen::Vector3d s = mm_from_slopes * SlopeAt(seen, grid, v);
+      if (!s.allFinite()) return;
+      const Eigen::Vector3d t = mm_from_slopes * SlopeAt(level.intensity, grid, v);
+      const double w = level.weight[v];
+      sum += {w * Symmetric(s, t), w * t, w * s, w};
+    });
   });
   return out;
 }

@@ -49,7 +49,7 @@ constexpr double kAcrossModalities = 1.7;
 
 // Two of three errors are within so many standard deviations (root of the covariance's trace). For normal
 // errors it would be 1.1. Read from phantoms of two generators: docs/results.md, "How sure". It is more than
-// most need, and less than scans with much noise do.
+// most need.
 constexpr double kDeviations = 1.2;
 
 // How likely it is that an error is below x times the stated one: 1 - exp(-kSteepness x^kShape). Such that of

@@ -135,7 +135,9 @@ Mask BonesOf(const LabelMap& labels) {
 }  // namespace
 
 bool BorderEdges::moved() const {
-  return shift.cwiseAbs().maxCoeff() >= kLeastMoved && nearby > kMuchBetter * here;
+  constexpr double kRounding = 1e-6;  // of mm; where slices are thick, borders stray by more than a pixel
+  return shift.cwiseAbs().maxCoeff() >= kLeastMoved && shift_mm >= (kLeastMoved - kRounding) * voxel_mm &&
+         nearby > kMuchBetter * here;
 }
 
 bool BorderEdges::follow_nothing() const { return here <= kMuchBetter * elsewhere; }
@@ -153,6 +155,8 @@ std::optional<BorderEdges> EdgesOfBorders(const Volume& scan, const LabelMap& la
   edges.here = scores.Of(Eigen::Vector3i::Zero());
   edges.shift = BestShift(scores);
   edges.nearby = scores.Of(edges.shift);
+  edges.shift_mm = edges.shift.cast<double>().cwiseProduct(scan.grid.spacing_mm).norm();
+  edges.voxel_mm = scan.grid.MeanSpacingMm();
   ForEachNeighbour(
       [&](const Eigen::Vector3i& step) { edges.elsewhere += scores.Of(kElsewhere * step) / 26; });
   return edges;

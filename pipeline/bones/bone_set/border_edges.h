@@ -12,9 +12,10 @@ struct BorderEdges {
   double here = 0;
   double nearby = 0;                                // the best that a shift of up to 7 voxels an axis reaches
   Eigen::Vector3i shift = Eigen::Vector3i::Zero();  // voxels: of the labels, to get there
+  double shift_mm = 0, voxel_mm = 0;                // the latter as Grid::MeanSpacingMm has it
   double elsewhere = 0;                             // mean of the 26 shifts by 6 voxels along some axes
 
-  bool moved() const;           // by two voxels or more: another place fits much better
+  bool moved() const;           // by two voxels or more, in mm too: another place fits much better
   bool follow_nothing() const;  // fits no better than other places: another scan's map, or a mirrored one
 };
 

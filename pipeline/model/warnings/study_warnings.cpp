@@ -160,9 +160,8 @@ std::vector<std::string> MisplacedLabelWarnings(const Volume& template_scan, con
         "scan, and not mirrored or moved since?"};
   }
   if (!edges->moved()) return {};
-  const double moved_mm = edges->shift.cast<double>().cwiseProduct(labels.grid.spacing_mm).norm();
   const auto along = [&](int axis) { return std::to_string(edges->shift[axis]); };
-  return {"the borders of the label map's bones lie about " + std::to_string(std::lround(moved_mm)) +
+  return {"the borders of the label map's bones lie about " + std::to_string(std::lround(edges->shift_mm)) +
           " mm beside the template's edges, which they would meet if the map were moved by (" + along(0) +
           ", " + along(1) + ", " + along(2) + ") voxels; was it made on this scan, and not moved since?"};
 }

@@ -78,6 +78,20 @@ TEST(EdgesOfBorders, SayHowAMapWasMoved) {
   EXPECT_FALSE(by_one->moved()) << "as far as hand-drawn borders stray";
 }
 
+// A knee's map in axial slices of 3.75 mm was told to lie 2.5 mm off: borders drawn there stray by as much.
+TEST(EdgesOfBorders, StrayByMorePixelsWhereSlicesAreThick) {
+  Marked made = TwoBones(100, 20);
+  made.scan.grid.spacing_mm.z() *= 3;
+  made.labels.grid = made.scan.grid;
+  const auto by_two = EdgesOfBorders(made.scan, Moved(made.labels, {2, 0, 0}));
+  ASSERT_TRUE(by_two);
+  EXPECT_EQ(by_two->shift, Eigen::Vector3i(-2, 0, 0));
+  EXPECT_FALSE(by_two->moved());
+  const auto by_four = EdgesOfBorders(made.scan, Moved(made.labels, {4, 0, 0}));
+  EXPECT_TRUE(by_four->moved());
+  EXPECT_NEAR(by_four->shift_mm, 4 * made.scan.grid.spacing_mm.x(), 1.01 * made.scan.grid.spacing_mm.x());
+}
+
 TEST(EdgesOfBorders, FollowNothingInAMirroredMap) {
   const Marked made = TwoBones(100, 20);
   const auto edges = EdgesOfBorders(made.scan, Mirrored(made.labels));

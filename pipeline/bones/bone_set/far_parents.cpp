@@ -5,7 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include "core/region_presets.h"
+#include "core/voxels/distance_transform.h"
 #include "core/voxels/label_surface.h"
+#include "core/voxels/voxel_box.h"
 
 namespace kvx {
 namespace {
@@ -19,6 +22,25 @@ bool HasOneMuchNearer(const BoneSet& bones, const BoneSurfaces& surfaces, int b,
     if (surfaces.ApartMm(b, other) <= kMuchNearer * parent_mm) return true;
   }
   return false;
+}
+
+bool MeetInPreset(const Bone& bone, const Bone& parent, Region region) {
+  const PresetBone* const of_bone = FindPreset(region, bone.name);
+  const PresetBone* const of_parent = FindPreset(region, parent.name);
+  return of_bone != nullptr && of_parent != nullptr && of_bone->parent == of_parent->name;
+}
+
+// Between the surfaces, at least: voxels' centres may lie inside them by half a voxel each. `within_mm`: the
+// bones are no farther apart.
+double LeastGapMm(const LabelMap& whole, int label, int other, double within_mm) {
+  const LabelMap labels = Cropped(whole, GrownByMm(BoxOf(whole, label), within_mm, whole.grid));
+  Mask bone(labels.grid);
+  for (size_t v = 0; v < bone.values.size(); ++v) bone.values[v] = labels.values[v] == label;
+  const Volume from_bone_mm = DistanceMapMm(bone);
+  double least_mm = within_mm;
+  for (size_t v = 0; v < labels.values.size(); ++v)
+    if (labels.values[v] == other) least_mm = std::min(least_mm, double(from_bone_mm.values[v]));
+  return least_mm - whole.grid.spacing_mm.maxCoeff();
 }
 
 }  // namespace
@@ -58,6 +80,20 @@ std::vector<FarParent> FarParents(const BoneSet& bones, const BoneSurfaces& surf
     if (apart_mm > kFarMm && HasOneMuchNearer(bones, surfaces, b, apart_mm)) far.push_back({b, apart_mm});
   }
   return far;
+}
+
+std::vector<FarParent> PartedJoints(const BoneSet& bones, const BoneSurfaces& surfaces, Region region) {
+  std::vector<FarParent> parted;
+  for (int b = 0; b < bones.size(); ++b) {
+    const Bone& bone = bones.bones[size_t(b)];
+    if (bone.parent == kNoParent) continue;
+    const Bone& parent = bones.bones[size_t(bone.parent)];
+    const double seen_mm = surfaces.ApartMm(b, bone.parent);  // of some voxels: they are no farther apart
+    if (seen_mm <= kFarMm || !MeetInPreset(bone, parent, region)) continue;
+    const double gap_mm = LeastGapMm(bones.labels, bone.label, parent.label, seen_mm);
+    if (gap_mm > kFarMm) parted.push_back({b, gap_mm});
+  }
+  return parted;
 }
 
 }  // namespace kvx

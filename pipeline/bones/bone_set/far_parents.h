@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "core/bone.h"
+#include "core/study.h"
 
 namespace kvx {
 
@@ -25,5 +26,9 @@ struct FarParent {
 // Bones more than kFarMm from their parent that have another bone, not one of their children, three times
 // nearer: the tree is not that of the joints.
 std::vector<FarParent> FarParents(const BoneSet& bones, const BoneSurfaces& surfaces);
+
+// Bones that by the region's preset meet their parent and whose surface is more than kFarMm from it, however
+// thick voxels are: an end of one of the two is missing, or a name is wrong. None of a custom region.
+std::vector<FarParent> PartedJoints(const BoneSet& bones, const BoneSurfaces& surfaces, Region region);
 
 }  // namespace kvx

@@ -154,7 +154,7 @@ class Build {
       }
       AddWarnings(NameWarnings(steps_.bones->Load(), study_.region));
       AddWarnings(MissingBoneWarnings(steps_.bones->Load(), study_.region));
-      AddWarnings(ParentWarnings(steps_.bones->Load()));
+      AddWarnings(ParentWarnings(steps_.bones->Load(), study_.region));
       if (steps_.segmented) steps_.segmented->Release();
     });
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "core/numbers/quantile.h"
 #include "core/region_presets.h"
@@ -138,17 +139,30 @@ std::vector<std::string> NameWarnings(const BoneSet& bones, Region region) {
       LooksOtherwise(bones, region));
 }
 
-std::vector<std::string> ParentWarnings(const BoneSet& bones) {
-  std::vector<std::string> far;
-  for (const FarParent& of : FarParents(bones, BoneSurfaces(bones))) {
+std::vector<std::string> ParentWarnings(const BoneSet& bones, Region region) {
+  const BoneSurfaces surfaces(bones);
+  const auto with_way = [&](const FarParent& of) {
     const Bone& bone = bones.bones[size_t(of.bone)];
-    far.push_back(bone.name + " (" + bones.bones[size_t(bone.parent)].name + " is " +
-                  std::to_string(std::lround(of.apart_mm)) + " mm away)");
-  }
-  return Naming(
-      "these bones lie far from their parents, with other bones much nearer; a bone's parent is the one that "
-      "it meets at a joint: ",
-      far);
+    return bone.name + " (" + bones.bones[size_t(bone.parent)].name + " is " +
+           std::to_string(std::lround(of.apart_mm)) + " mm away)";
+  };
+  std::vector<std::string> parted, far;
+  std::set<int> told;
+  for (const FarParent& of : PartedJoints(bones, surfaces, region))
+    parted.push_back(with_way(of)), told.insert(of.bone);
+  for (const FarParent& of : FarParents(bones, surfaces))
+    if (!told.contains(of.bone)) far.push_back(with_way(of));
+  std::vector<std::string> warnings = Naming(
+      "these bones lie farther from those that they meet than any joint is wide; does one of the two lack "
+      "its "
+      "end, as beyond a growth plate or a fracture where no stroke lies, or is a name wrong? ",
+      parted);
+  std::ranges::move(
+      Naming("these bones lie far from their parents, with other bones much nearer; a bone's parent is the "
+             "one that it meets at a joint: ",
+             far),
+      std::back_inserter(warnings));
+  return warnings;
 }
 
 std::vector<std::string> MisplacedLabelWarnings(const Volume& template_scan, const LabelMap& labels) {

@@ -41,8 +41,9 @@ std::vector<std::string> MissingBoneWarnings(const BoneSet& bones, Region region
 // A line for bones that look like others of their region: two labels may have changed places.
 std::vector<std::string> NameWarnings(const BoneSet& bones, Region region);
 
-// A line for bones that lie far from their parent, another bone much nearer: the tree is not that of joints.
-std::vector<std::string> ParentWarnings(const BoneSet& bones);
+// A line for bones that lie far from one that they should meet at a joint (an end is missing), and one for
+// others that lie far from their parent, another bone much nearer: the tree is not that of joints.
+std::vector<std::string> ParentWarnings(const BoneSet& bones, Region region);
 
 // A line where the map's borders lie beside the scan's edges, and how far to move it, or on none at all: a
 // map of another scan, or one that a tool has moved or mirrored. Smaller errors do not show.

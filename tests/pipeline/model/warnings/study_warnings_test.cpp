@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -94,9 +96,30 @@ TEST(ParentWarnings, NameBonesThatHangOnOneFarAway) {
     set.bones.push_back(
         {.label = b + 1, .name = std::string(1, char('a' + b)), .parent = b - 1, .voxels = 4});
   }
-  EXPECT_THAT(ParentWarnings(set), IsEmpty());
+  EXPECT_THAT(ParentWarnings(set, Region::kCustom), IsEmpty());
   set.bones[2].parent = 0;
-  EXPECT_THAT(ParentWarnings(set), ElementsAre(testing::EndsWith(": c (a is 21 mm away)")));
+  EXPECT_THAT(ParentWarnings(set, Region::kCustom), ElementsAre(testing::EndsWith(": c (a is 21 mm away)")));
+}
+
+// A femur that ends at a plate 14 mm before the tibia, which a fibula 2 mm beside it does not make right.
+TEST(ParentWarnings, AskForTheEndsOfBonesThatShouldMeet) {
+  BoneSet set;
+  Grid grid;
+  grid.size = {4, 5, 40};
+  grid.spacing_mm.setOnes();
+  set.labels = LabelMap(grid);
+  const std::array<std::string, 3> names = {"femur", "tibia", "fibula"};
+  const std::array parents = {kNoParent, 0, 1};
+  for (int b = 0; b < 3; ++b)
+    set.bones.push_back({.label = b + 1, .name = names[size_t(b)], .parent = parents[size_t(b)]});
+  for (int k = 0; k < 10; ++k) set.labels(1, 1, k) = 1;
+  for (int k = 24; k < 40; ++k) set.labels(1, 1, k) = 2, set.labels(3, 1, k) = 3;
+  const auto asked =
+      ElementsAre(AllOf(HasSubstr("growth plate"), testing::EndsWith("? tibia (femur is 14 mm away)")));
+  EXPECT_THAT(ParentWarnings(set, Region::kKnee), asked);
+  EXPECT_THAT(ParentWarnings(set, Region::kCustom), IsEmpty()) << "bones need not meet";
+  for (int k = 10; k < 14; ++k) set.labels(1, 1, k) = 1;
+  EXPECT_THAT(ParentWarnings(set, Region::kKnee), IsEmpty()) << "a wide joint";
 }
 
 TEST(BonesOutsideBody, AreThoseThatLieInAir) {

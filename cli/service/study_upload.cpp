@@ -3,7 +3,9 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -211,14 +213,24 @@ class Sender {
     if (!HoldsDicom(labels)) return labels;
     RequireReadableSegments(labels, "DICOM", study_.bones);
     Show("packing the bones");
-    LayeredLabels given = ReadLabelsOrMasks(labels, study_.bones);
+    const LayeredLabels given = ReadLabelsOrMasks(labels, study_.bones);
     const std::filesystem::path file = Scratch("bones.nii.gz");
     Packed([&] { WriteLabels(file, given.labels); });
-    std::vector<std::pair<std::string, size_t>> shared;
-    for (const StudyBone& bone : study_.bones)
-      shared.emplace_back(bone.name, given.shared_voxels[bone.label]);
-    for (const std::string& warning : SharedVoxelWarnings(shared)) warn_(warning);
+    for (const std::string& warning : SharedVoxelWarnings(Named(given.shared_voxels))) warn_(warning);
     return file;
+  }
+
+  // Without a list the service names the bones, and numbers tell them apart.
+  std::vector<std::pair<std::string, size_t>> Named(const std::map<int, size_t>& voxels_of_label) const {
+    std::vector<std::pair<std::string, size_t>> named;
+    for (const auto& [label, voxels] : voxels_of_label) {
+      const auto bone = std::ranges::find(study_.bones, label, &StudyBone::label);
+      if (bone != study_.bones.end())
+        named.emplace_back(bone->name, voxels);
+      else if (study_.bones.empty())
+        named.emplace_back("label " + std::to_string(label), voxels);
+    }
+    return named;
   }
 
   // A folder is packed; a header with its data in another file becomes one file.

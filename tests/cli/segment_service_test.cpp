@@ -9,6 +9,7 @@
 #include "pipeline/io/volume_file.h"
 #include "server/http_library.h"
 #include "tests/support/check_contract.h"
+#include "tests/support/dicom_segmentation.h"
 #include "tests/support/hinge_study.h"
 #include "tests/support/served.h"
 
@@ -132,6 +133,22 @@ TEST_F(SegmentService, StrokesMakeBonesThatAModelIsBuiltOf) {
     claimed += made.values[v] != 0, wanted += truth.values[v] != 0;
   }
   EXPECT_GT(2.0 * double(right) / double(claimed + wanted), 0.9);
+}
+
+// Whether the study lists its bones or leaves that to its region.
+TEST_F(SegmentService, SegmentsThatOverlapAreToldWhenTheyAreSent) {
+  json study = json::parse(Content(testing_support::WriteHingeStudy(scratch.path())));
+  testing_support::WriteSegmentation(At("seg.dcm"), {.segments = 2, .frames = {{1}, {1, 1}, {2}, {2, 2}}});
+  study["bones"]["labels"] = "seg.dcm";
+  const auto told = [&](const char* name, const std::string& region) {
+    study["name"] = name, study["region"] = region;
+    std::ofstream(At("overlap.json")) << study;
+    return RunProgram(scratch.path(), {"submit", At("overlap.json").string(), "--server", server_.url()}).err;
+  };
+  EXPECT_THAT(told("listed", "custom"), testing::HasSubstr("masks share voxels"));
+  study["bones"].erase("list");
+  study.erase("joints");
+  EXPECT_THAT(told("by region", "knee"), testing::ContainsRegex("masks share voxels.*: label 2 \\(5\\)"));
 }
 
 TEST_F(SegmentService, MoreStrokesKeepTheBoneThatTheyAgreeWith) {

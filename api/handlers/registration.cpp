@@ -6,8 +6,7 @@
 namespace kvx {
 namespace {
 
-RegistrationMap MapOf(const Query& query) {
-  const std::string name = QueryValue(query, "map", "scan_from_template");
+RegistrationMap MapCalled(const std::string& name) {
   if (name == "scan_from_template") return RegistrationMap::kScanFromTemplate;
   if (name == "template_from_scan") return RegistrationMap::kTemplateFromScan;
   if (name == "confidence") return RegistrationMap::kConfidence;
@@ -20,7 +19,8 @@ RegistrationMap MapOf(const Query& query) {
 FileAnswer GetRegistration(Services& services, const std::string& model, const Query& query,
                            const Conditions& conditions) {
   RequireKnown(query, {"scan", "map", "format"});
-  const RegistrationMap map = MapOf(query);
+  const std::string map_name = QueryValue(query, "map", "scan_from_template");
+  const RegistrationMap map = MapCalled(map_name);
   const std::string format = FormatAmong(query, {"nii.gz", "nrrd", "mha"}, "a registration"),
                     scan = QueryValue(query, "scan");
   if (scan.empty()) throw InputError("'scan' is missing; name one of the model's scans");
@@ -31,7 +31,8 @@ FileAnswer GetRegistration(Services& services, const std::string& model, const Q
   const Digest digest =
       Hasher().Add("registration").Add(facts.digest).Add(scan).Add(int64_t(map)).Add(format).Finish();
   const char* type = format == "nii.gz" ? "application/gzip" : "application/octet-stream";
-  FileAnswer answer = AnswerWith(digest, conditions, type, model + "." + scan + "." + format, [&] {
+  const std::string filename = PosedFileName(model, digest, map_name + "." + format);  // no name of a user's
+  FileAnswer answer = AnswerWith(digest, conditions, type, filename, [&] {
     const Asker asker = services.asker();
     const auto write = [&](const std::filesystem::path& path) {
       services.poser.WriteRegistration(model, scan, map, path, asker);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 #include <thread>
 
 #include "tests/support/running_server.h"
@@ -187,6 +188,12 @@ TEST(HttpServer, ARegistrationIsOneFileForEachMapScanAndFormat) {
   EXPECT_EQ(s.http.Get(path + "&map=template_from_scan&format=nrrd")->body, "map 1 of pose01");
   EXPECT_EQ(s.http.Get(path + "&map=confidence&format=mha")->body, "map 2 of pose01");
   EXPECT_EQ(s.http.Get(path + "&map=error&format=mha")->body, "map 3 of pose01");
+  std::set<std::string> names;  // that a browser saves them under
+  for (const char* map : {"", "&map=template_from_scan", "&map=confidence", "&map=error"})
+    names.insert(s.http.Get(path + map)->get_header_value("Content-Disposition"));
+  EXPECT_EQ(names.size(), 4u);
+  for (const std::string& name : names)
+    EXPECT_EQ(name.find("pose01"), name.npos) << name << ": a user's name";
   EXPECT_EQ(s.http.Get(path, {{"If-None-Match", forward->get_header_value("ETag")}})->status, 304);
   EXPECT_EQ(s.http.Get(path + "&map=certainty")->status, 400);
   EXPECT_EQ(s.http.Get(path + "&format=png")->status, 400);

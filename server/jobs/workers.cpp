@@ -135,6 +135,7 @@ void Workers::RunJobOf(Running& running) {
 // What a job's end looks like when the build threw. A failure to write it down leaves the lease to run out.
 void Workers::EndWithError(Running& running, std::exception_ptr error) try {
   const std::string& id = running.job.id;
+  if (running.ended) return;
   if (running.lost) return LogError("job lost", {{"job", id}});
   try {
     std::rethrow_exception(error);
@@ -239,6 +240,7 @@ void Workers::Beat(Running& running) try {
   if (SteadyMs() - running.cancel_seen_ms < kCancelPatienceMs) return;
   services_.jobs.EndCancelled(
       running.job);  // from here on its thread can change nothing, and ends at its next report
+  running.ended = true;
   running.lost = true;
   LogInfo("job cancelled in the middle of a step", {{"job", running.job.id}});
 } catch (const Conflict&) {

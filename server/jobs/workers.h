@@ -32,6 +32,7 @@ class Workers {
     ClaimedJob job;
     std::atomic<bool> cancel{false};
     std::atomic<bool> lost{false};
+    std::atomic<bool> ended{false};              // lost, since the heartbeat has cancelled it
     int64_t renewed_ms = 0, cancel_seen_ms = 0;  // the heartbeat's own
     std::mutex mutex;                            // of what follows
     std::string stage;

@@ -10,6 +10,7 @@
 #include <system_error>
 #include <thread>
 
+#include "server/log.h"
 #include "tests/support/failing_new.h"
 #include "tests/support/running_server.h"
 #include "tests/support/scarce_memory.h"
@@ -36,6 +37,25 @@ TEST(Workers, ARunningJobIsCancelled) {
   EXPECT_EQ(s.http.Delete("/v1/jobs/" + job)->status, 202);
   EXPECT_EQ(s.WaitFor(job)["state"], "cancelled");
   ExpectProblem(s.http.Delete("/v1/jobs/" + job), 409);
+}
+
+// Whoever watches a log for errors sees none of what a user wished.
+TEST(Workers, AJobThatIsCancelledWithoutItsHelpIsNoError) {
+  RunningServer s;
+  s.world.builder.Hold();
+  s.world.builder.deaf = true;
+  const std::string job = s.Model()["job"];
+  for (int i = 0; i < 1000 && s.world.builder.builds == 0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  SetLogLevel("error");
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(s.http.Delete("/v1/jobs/" + job)->status, 202);
+  EXPECT_EQ(s.WaitFor(job)["state"], "cancelled");
+  s.world.builder.deaf = false;
+  s.world.builder.Open();
+  s.workers->Stop();  // its thread has ended, too
+  SetLogLevel("off");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
 TEST(Workers, StoppingGivesTheJobBackToTheQueue) {

@@ -177,7 +177,8 @@ StudyParts MakeStudy(Services& services, const std::string& model, const Json& r
   parts.study = {{"name", model}, {"region", subject.region}, {"template", template_scan}};
   parts.study["scans"] = Json::array();
   for (const ScanRecord& scan : ChosenScans(services, subject.id, template_scan, request)) {
-    const std::string name = "scans/" + scan.name + scan.file.suffix;
+    // A series lies apart: it may be called as another scan's file is
+    const std::string name = (scan.file.suffix.empty() ? "series/" : "scans/") + scan.name + scan.file.suffix;
     parts.study["scans"].push_back({{"name", scan.name}, {"volume", name}});
     parts.AddFile(name, scan.file);
   }

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "tests/support/handler_requests.h"
 
 namespace kvx {
@@ -32,6 +34,19 @@ TEST(Models, BecomeAJobOverTheUploadedFiles) {
   EXPECT_EQ(study["scans"][1]["volume"], "scans/pose01.nii.gz");
   EXPECT_EQ(CreateModel(w.services, body, "k").body, answer.body);
   EXPECT_FALSE(w.jobs.Claim("w")) << "the repeated request makes no second job";
+}
+
+TEST(Models, ASeriesMayBeCalledAsTheFileOfAnotherScanIs) {
+  ServiceWorld w;
+  const std::string subject = SubjectWithScans(w);
+  StoredFile series = w.catalogue.FindScan(subject, "pose01")->file;
+  series.suffix.clear();
+  w.catalogue.AddScan(subject, "pose01.nii.gz", series);
+  const PreparedModel model = PrepareModel(w.services, {{"subject", subject}, {"template", "pose00"}});
+  std::set<std::string> names;
+  const BuildTask task = TaskOf(w.blobs, model.id, model.stored);
+  for (const StudyFile& file : task.files) names.insert(file.name);
+  EXPECT_EQ(names.size(), task.files.size()) << "of links in one folder";
 }
 
 // All examples side by side, where one has lost a bone: 13 bytes a voxel of the 4 x 5 x 6.

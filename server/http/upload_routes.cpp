@@ -42,6 +42,11 @@ void ReceiveUpload(Upload upload, const Request& request, const ContentReader& r
   SendAnswer(response, upload.Finish());
 }
 
+// Of a request whose scan is here already.
+void RequireNoFile(const ContentReader& reader) try { ReadBody(reader, 0); } catch (const BodyTooLarge&) {
+  throw InputError("a threshold needs no file; post it without a body");
+}
+
 // PUT .../scans/{name} and .../bones/{template}: the same bytes again are no conflict.
 Upload PutUpload(Services& services, const Request& request, const char* what) {
   Query query = QueryOf(request);
@@ -180,7 +185,7 @@ void AddUploadRoutes(httplib::Server& http, HttpContext& c) {
   });
   http.Post("/v1/subjects/:id/bones", [&](const Request& q, Response& r, const ContentReader& body) {
     if (BonesKindOf(QueryOf(q)) == BonesKind::kThreshold) {
-      ReadBody(body, 0);
+      RequireNoFile(body);
       return SendAnswer(r, CreateThresholdBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), KeyIn(q)));
     }
     ReceiveUpload(Upload::OfBones(ServicesOf(r), q.path_params.at("id"), QueryOf(q), KeyIn(q)), q, body, c,

@@ -274,7 +274,7 @@ TEST_F(SegmentService, AThresholdOfACtNumbersBySize) {
       RunProgram(scratch.path(), {"segment", At("study.json"), "--out", At("by_study.nrrd")});
   EXPECT_NE(of_study.err.find("misspelt? bones.list[0].parnet"), std::string::npos) << of_study.err;
   Post(subject + "/bones?template=pose00&kind=threshold&threshold=3000", "", 400);
-  Post(subject + "/bones?template=pose00&kind=threshold", "strokes?", 413);
+  Post(subject + "/bones?template=pose00&kind=threshold", "strokes?", 400);
 }
 
 TEST_F(SegmentService, SaysWhatIsWrongWithStrokesAndKeepsNothing) {

@@ -179,6 +179,15 @@ TEST(Bones, ScansAndStrokesAreReadOneAfterTheOther) {
   EXPECT_EQ(accepted + busy, 20);
 }
 
+TEST(Bones, AFileSentWithAThresholdIsNoFileThatIsTooLarge) {
+  testing_support::RunningServer s({}, false);
+  const std::string path = "/v1/subjects/" + s.Subject() + "/bones?template=pose00&kind=threshold";
+  const auto refused = s.http.Post(path, "VOXELS", "application/octet-stream");
+  testing_support::ExpectProblem(refused, 400);
+  EXPECT_THAT(refused->body, testing::HasSubstr("needs no file"));
+  EXPECT_EQ(s.http.Post(path)->status, 202);
+}
+
 TEST(Bones, TheSameRequestIsOneJob) {
   BonesWorld w;
   EXPECT_EQ(w.SendStrokes("k1").body, w.SendStrokes("k1").body);

@@ -9,6 +9,7 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -27,6 +28,8 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 constexpr size_t kLongestAnswer = size_t(4) << 20;  // a label map may hold 65535 labels
 constexpr int kLookEveryMs = 200;
+constexpr int kLongestWait = 4;  // times the limit, of a reader that computes
+constexpr int kLeastShare = 50;  // that has at least a fiftieth of a processor
 constexpr char kBroken[] =
     "the file is so damaged that it cannot be read; export or convert the original images again";
 constexpr char kTooHard[] =
@@ -60,7 +63,8 @@ struct Child {
 
   Child(const std::filesystem::path& program, const std::vector<std::string>& words);
   ~Child();
-  std::string Answer(SteadyClock::time_point until, const std::function<void()>& require_going_on);
+  std::string Answer(std::chrono::seconds limit, const std::function<void()>& require_going_on);
+  bool Computes(SteadyClock::duration took) const;  // or hangs
   int Wait();
 };
 
@@ -93,12 +97,24 @@ Child::~Child() {
   ::close(from);
 }
 
-std::string Child::Answer(SteadyClock::time_point until, const std::function<void()>& require_going_on) {
+// Where builds have the processors, a file that is in order takes several times as long; its own limit of
+// processor time goes on.
+bool Child::Computes(SteadyClock::duration took) const {
+  clockid_t clock;
+  timespec spent{};
+  if (::clock_getcpuclockid(pid, &clock) != 0 || ::clock_gettime(clock, &spent) != 0) return false;
+  const auto computed = std::chrono::seconds(spent.tv_sec) + std::chrono::nanoseconds(spent.tv_nsec);
+  return kLeastShare * computed > took;
+}
+
+std::string Child::Answer(std::chrono::seconds limit, const std::function<void()>& require_going_on) {
+  const auto began = SteadyClock::now();
   std::string answer;
   char chunk[4096];
   while (answer.size() < kLongestAnswer) {
     require_going_on();
-    if (SteadyClock::now() >= until) throw InputError(kTooHard);
+    const auto took = SteadyClock::now() - began;
+    if (took >= kLongestWait * limit || (took >= limit && !Computes(took))) throw InputError(kTooHard);
     pollfd ready{from, POLLIN, 0};
     const int count = ::poll(&ready, 1, kLookEveryMs);
     if (count == 0 || (count < 0 && errno == EINTR)) continue;
@@ -149,8 +165,8 @@ ScalarType TypeOf(const std::string& name) {
 std::string ChildInspector::Ask(const std::vector<std::string>& words, const std::string& project) {
   const ProjectTurns::Turn turn(turns_, project);
   Child child(program_, words);
-  const std::string answer = child.Answer(SteadyClock::now() + std::chrono::seconds(limits_.seconds),
-                                          [this] { RequireNotDrained(); });
+  const std::string answer =
+      child.Answer(std::chrono::seconds(limits_.seconds), [this] { RequireNotDrained(); });
   const int status = child.Wait();
   const Json json = Json::parse(answer, nullptr, false);
   if (json.is_object() && json.contains("refusal")) throw InputError(json["refusal"].get<std::string>());

@@ -9,7 +9,7 @@
 namespace kvx {
 
 struct InspectionLimits {
-  int seconds = 120;                         // of wall time and of processor time
+  int seconds = 120;                         // of processor time, and of wall time unless the machine is busy
   int64_t memory_bytes = int64_t(12) << 30;  // of address space
   int at_the_same_time = 2;                  // of one project one; more wait. Archives are counted apart
   int waiting_of_project = 16;               // beyond: Unavailable

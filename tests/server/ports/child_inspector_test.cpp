@@ -89,6 +89,20 @@ TEST(ChildInspector, AReaderThatHangsIsStopped) {
   EXPECT_NE(InspectorWorld().RefusalOf("exec sleep 600", limits).find("time"), std::string::npos);
 }
 
+// The processors are others' meanwhile: the file is not at fault.
+TEST(ChildInspector, AReaderThatComputesIsWaitedFor) {
+  InspectorWorld w;
+  InspectionLimits limits;
+  limits.seconds = 2;
+  const auto reader = w.Script(R"sh(exec /usr/bin/python3 -c '
+import time
+end = time.monotonic() + 3
+while time.monotonic() < end: pass
+print("""{"facts":{"size":[4,5,6],"spacing":[1,1,1],"origin":[0,0,0],
+          "direction":[1,0,0,0,1,0,0,0,1],"modality":"MR","type":"int16"}}""")')sh");
+  EXPECT_EQ(ChildInspector(reader, limits).InspectScan("file", "lab").grid.size, Eigen::Vector3i(4, 5, 6));
+}
+
 TEST(ChildInspector, AProgramThatIsNotThereIsNoFaultOfTheFile) {
   ChildInspector inspector("/nowhere/kinevox");
   EXPECT_THROW(inspector.InspectScan("file", "lab"), Unavailable);

@@ -1,6 +1,8 @@
 // JSON bodies are validated by valijson against the document's schemas.
 #include "tests/support/api_contract.h"
 
+#include <algorithm>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
@@ -30,6 +32,22 @@ bool Matches(const std::string& pattern, const std::string& path) {
     if (!wanted[i].starts_with('{') && wanted[i] != given[i]) return false;
   }
   return true;
+}
+
+// Not those that every answer may have, which say nothing of what was asked for.
+bool GoesBy(const std::string& header) {
+  constexpr std::string_view kOthers[] = {
+      "Location",    "Content-Location", "ETag", "Content-Disposition", "Content-Range",
+      "Retry-After", "WWW-Authenticate", "Allow"};
+  return header.starts_with("X-Kinevox-") || header.starts_with("Upload-") ||
+         std::ranges::find(kOthers, header) != std::end(kOthers);
+}
+
+std::string HeaderViolation(const json& response, const AnswerSeen& answer) {
+  const json described = response.value("headers", json::object());
+  for (const std::string& header : answer.headers)
+    if (GoesBy(header) && !described.contains(header)) return "the header " + header + " is not described";
+  return "";
 }
 
 std::string MediaType(const std::string& content_type) {
@@ -161,7 +179,8 @@ std::string ApiContract::Violation(const AnswerSeen& answer) const {
   }
   const json& response =
       state_->Resolved(responses.contains(status) ? responses[status] : responses["default"]);
-  const std::string violation = state_->ContentViolation(response, answer);
+  std::string violation = state_->ContentViolation(response, answer);
+  if (violation.empty()) violation = HeaderViolation(response, answer);
   return violation.empty() ? "" : answer.method + " " + answer.path + " " + status + ": " + violation;
 }
 

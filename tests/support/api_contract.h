@@ -1,9 +1,10 @@
 // Checks answers against the service's own document (openapi.json):
-// every status, media type and body must be described.
+// every status, media type and body must be described, and every header that a client goes by.
 #pragma once
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace kvx::testing_support {
 
@@ -11,6 +12,7 @@ struct AnswerSeen {
   std::string method, path;  // without the query
   int status = 0;
   std::string content_type, body;
+  std::vector<std::string> headers = {};  // their names
 };
 
 class ApiContract {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <vector>
 
 #include "api/embedded_schema.h"
 #include "server/http_library.h"
@@ -13,8 +14,10 @@ namespace kvx::testing_support {
 inline void CheckContract(const httplib::Request& request, const httplib::Response& response) {
   static const ApiContract contract(EmbeddedSchema("openapi.json"));
   const std::string path = request.path.substr(0, request.path.find('?'));
+  std::vector<std::string> headers;
+  for (const auto& [name, value] : response.headers) headers.push_back(name);
   EXPECT_EQ(contract.Violation({request.method, path, response.status,
-                                response.get_header_value("Content-Type"), response.body}),
+                                response.get_header_value("Content-Type"), response.body, headers}),
             "");
 }
 

@@ -87,6 +87,9 @@ TEST(UploadRoutes, SpeakTus) {
   EXPECT_EQ(done->status, 204);
   EXPECT_EQ(s.http.Get(done->get_header_value("Content-Location"))->status, 200);
   EXPECT_EQ(Json::parse(s.http.Get(at)->body)["state"], "finished");
+  EXPECT_EQ(
+      s.http.Head(at, httplib::Headers{{"Tus-Resumable", "1.0.0"}})->get_header_value("Content-Location"),
+      done->get_header_value("Content-Location"));
 }
 
 // The record of a resumable upload is gone after some days.

@@ -171,7 +171,9 @@ void AddSegment(CLI::App& program, CommandContext& context) {
                    "The label map that fewer of these strokes gave: only bones that new strokes change are "
                    "looked for again")
       ->type_name("FILE");
-  command->add_option("--threshold", arguments->threshold, "CT without strokes: a level in HU, or auto")
+  command
+      ->add_option("--threshold", arguments->threshold,
+                   "CT without strokes: a level in HU (60 or more), or auto")
       ->type_name("HU");
   command
       ->add_option("--region", arguments->region,
@@ -187,7 +189,8 @@ void AddSegment(CLI::App& program, CommandContext& context) {
       "With --previous a bone keeps its voxels unless a stroke says otherwise; give all strokes of the bones "
       "that change, old ones too: one without any only loses the voxels that strokes mark as something else, "
       "with a warning. Background alone is enough then. A stroke taken away is not noticed.\n"
-      "A bone goes no farther than a growth plate or a fracture that crosses it: draw strokes on either side.\n"
+      "A bone goes no farther than a growth plate or a fracture that crosses it: draw strokes on either "
+      "side.\n"
       "No voxel of a stroke is ever given to anything else.\n\n"
       "Examples:\n  kinevox segment pose00.nii.gz --seeds strokes.nii.gz --out bones.nii.gz\n"
       "  kinevox segment pose00.nii.gz --seeds more.nii.gz --previous bones.nii.gz --out bones.nii.gz\n"

@@ -18,6 +18,7 @@
 namespace kvx {
 namespace {
 
+constexpr double kMuscleHu = 60;
 constexpr double kSurelyKept = 0.85;  // of a threshold's parts at other levels
 constexpr double kGapMm = 1.5;        // of a joint, thinner ones are closed by the blur of a voxel
 
@@ -63,6 +64,16 @@ SegmentedBones BonesByThreshold(const Volume& scan_hu, const BoneLevels& levels,
   return bones;
 }
 
+std::vector<BoneDoubt> SharedStrokes(const LayeredLabels& strokes) {
+  std::vector<BoneDoubt> doubts;
+  for (const auto& [label, voxels] : strokes.shared_voxels) {
+    doubts.push_back({label,
+                      "some of its strokes' voxels are an earlier segment's as well, and count for that one "
+                      "alone; draw them where only this bone is"});
+  }
+  return doubts;
+}
+
 }  // namespace
 
 void RequireThreshold(const Scan& scan, std::optional<double> level_hu) {
@@ -78,6 +89,10 @@ void RequireThreshold(const Scan& scan, std::optional<double> level_hu) {
         "a threshold tells bone from soft tissue in CT only, and this scan is none by its greys (Hounsfield "
         "units, with air below -500): draw strokes (seeds), or give the CT with some air around the limb and "
         "in Hounsfield units");
+  }
+  if (level_hu && *level_hu < kMuscleHu) {
+    throw InputError(
+        "at this threshold muscle counts as bone, too (60 HU and less); give 100 to 300, or auto");
   }
   if (level_hu && std::ranges::none_of(scan.volume.values, [&](float v) { return v > *level_hu; })) {
     throw InputError("nothing in the scan is as dense as the threshold; give a lower one, or auto");
@@ -97,12 +112,14 @@ SegmentedBones SegmentBones::Run(const Inputs& inputs, const Options& options, S
   const Scan& scan = *inputs.scan;
   if (!inputs.strokes_path.empty()) {
     const bool go_on = !inputs.previous_path.empty();
-    const LabelMap strokes = CarriedStrokes(ReadLabels(inputs.strokes_path), scan.volume.grid, go_on);
+    const LayeredLabels given = ReadLayeredLabels(inputs.strokes_path);
+    const LabelMap strokes = CarriedStrokes(given.labels, scan.volume.grid, go_on);
     RequireListed(strokes, options.listed);
     LabelMap previous;
     if (go_on) previous = ReadPreviousLabels(inputs.previous_path, scan.volume.grid);
     GrownBones grown = GrowBones(scan.volume, strokes, IsHounsfield(scan.volume, scan.modality),
                                  context.progress, go_on ? &previous : nullptr);
+    std::ranges::move(SharedStrokes(given), std::back_inserter(grown.doubts));
     return {std::move(grown.labels), {}, false, std::move(grown.doubts), std::move(grown.expected_dice)};
   }
   RequireThreshold(scan, options.level_hu);

@@ -21,7 +21,7 @@ void Fields(A& a, SegmentedBones& v) {
 
 struct SegmentBones {
   static constexpr std::string_view kName = "segment";
-  static constexpr int kVersion = 26;
+  static constexpr int kVersion = 27;
   struct Inputs {
     const Artifact<Scan>& scan;
     Digest strokes_content;              // ContentDigest(strokes_path); zero without strokes
@@ -38,7 +38,8 @@ struct SegmentBones {
   };
   using Output = SegmentedBones;
   // Throws InputError: no strokes of a bone, and of the background neither where there are previous labels;
-  // previous labels of another grid, a threshold for a scan that is no CT, nothing above the threshold.
+  // previous labels of another grid, a threshold for a scan that is no CT, nothing above the threshold, a
+  // threshold below muscle.
   static Output Run(const Inputs& inputs, const Options& options, StageContext& context);
 };
 template <class A>
@@ -46,7 +47,8 @@ void Fields(A& a, SegmentBones::Options& v) {
   a(v.level_hu, v.listed);
 }
 
-// Throws InputError for a scan that is no CT, and for one that holds nothing above the level.
+// Throws InputError for a scan that is no CT, for one that holds nothing above the level, and for a level
+// below muscle.
 void RequireThreshold(const Scan& scan, std::optional<double> level_hu);
 
 // Throws InputError for labels that are not on the template's grid, and for a scan.

@@ -142,6 +142,11 @@ TEST(ReadScanEvenly, ACtWithoutItsRescaleIsOfUnknownModality) {
   EXPECT_EQ(whole.modality, "CT");
   EXPECT_FALSE(whole.denied_ct);
   EXPECT_NO_THROW(RequireThreshold(whole, 300));
+  for (const double level_hu : {0.0, -2000.0, 59.0}) {  // 0 as some tools have for "automatic"
+    EXPECT_THAT([&] { RequireThreshold(whole, level_hu); },
+                testing::ThrowsMessage<InputError>(testing::HasSubstr("or auto")));
+  }
+  EXPECT_NO_THROW(RequireThreshold(whole, 60));
   write("0");
   const Scan stripped = ReadScanEvenly(folder.path());
   EXPECT_EQ(stripped.modality, "");

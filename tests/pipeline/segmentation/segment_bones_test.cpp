@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "core/errors.h"
 #include "pipeline/io/volume_file.h"
 #include "tests/support/dice.h"
@@ -59,6 +61,37 @@ TEST(SegmentBones, AScanIsNoPreviousLabelMap) {
   WriteLabels(file, map);
   EXPECT_THAT(testing_support::RefusalOf<InputError>([&] { ReadPreviousLabels(file, map.grid); }),
               testing::HasSubstr("previous label map holds greys"));
+}
+
+// Two balls of marrow in dark shells, and a line through each; the first line's middle is the second's, too.
+TEST(SegmentBones, StrokesThatShareVoxelsAreToldOf) {
+  Grid grid;
+  grid.size = {30, 16, 16};
+  Scan scan{.volume = Volume(grid), .modality = "MR"};
+  std::string layers;  // two, voxel by voxel
+  for (size_t v = 0; v < grid.VoxelCount(); ++v) {
+    const Eigen::Vector3i at = grid.Ijk(v);
+    const double away = std::min((at - Eigen::Vector3i(8, 8, 8)).cast<double>().norm(),
+                                 (at - Eigen::Vector3i(21, 8, 8)).cast<double>().norm());
+    scan.volume.values[v] = away < 5 ? 100 : away < 6.5 ? 5 : 50;
+    const bool lines = at.y() == 8 && at.z() == 8;
+    layers += char(lines && std::abs(at.x() - 8) <= 2);
+    layers += char(lines && (std::abs(at.x() - 21) <= 2 || at.x() == 8));
+  }
+  const testing_support::ScratchFolder folder;
+  std::ofstream(folder.path() / "strokes.seg.nrrd", std::ios::binary)
+      << "NRRD0004\ntype: unsigned char\ndimension: 4\nsizes: 2 30 16 16\nspacings: nan 1 1 1\nencoding: "
+         "raw\n"
+      << "kinds: list domain domain domain\nSegment0_ID:=a\nSegment1_ID:=b\n\n"
+      << layers;
+  StageContext context{testing_support::SharedBackend(), {}};
+  const Artifact<Scan> loaded{{}, std::make_shared<const Scan>(std::move(scan))};
+  const SegmentedBones bones =
+      SegmentBones::Run({loaded, {}, folder.path() / "strokes.seg.nrrd"}, {}, context);
+  EXPECT_EQ(bones.labels(8, 8, 8), 1) << "the first segment's";
+  EXPECT_EQ(bones.labels(21, 8, 8), 2);
+  EXPECT_THAT(WarningsOf(bones, std::map<int, std::string>{}),
+              testing::Contains(testing::StartsWith("bone 2: some of its strokes' voxels")));
 }
 
 // A real CT of a wrist's bones (greys are HU + 1024, 0 around), cut out and laid into soft tissue, with air

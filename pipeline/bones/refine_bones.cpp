@@ -93,7 +93,7 @@ BoneFits RefineBones::Run(const Inputs& inputs, const Options& options, StageCon
   for (int b = 0; b < bones.size(); ++b) Take(bones.bones[b], estimates[b], out[b]);
   WeighHints(bones, options.initial_poses, out);
   NameUnlikeParts(bones, alike.tissue, scan, out);
-  NameAnotherSize(bones, alike.tissue, scan, out);
+  NameAnotherSize(bones, alike, scan, out);
   return out;
 }
 

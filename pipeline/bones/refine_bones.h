@@ -9,7 +9,7 @@ namespace kvx {
 
 struct RefineBones {
   static constexpr std::string_view kName = "refine_bones";
-  static constexpr int kVersion = 17;
+  static constexpr int kVersion = 18;
   struct Inputs {
     BoneTemplate& shown;
     const Artifact<Scan>& scan;

@@ -26,12 +26,12 @@ struct StretchedBone {
   Eigen::Matrix3d grid_from_template;  // turn, to the axes of the scan's grid
 };
 
-std::vector<StretchedBone> StretchesOf(const BoneSet& bones, std::span<const BoneTissue> tissue,
-                                       const CubicImage& scan, const BoneFits& fits) {
+std::vector<StretchedBone> StretchesOf(const BoneSet& bones, const SeenTemplate& seen, const CubicImage& scan,
+                                       const BoneFits& fits) {
   std::vector<std::optional<BoneStretch>> stretches(fits.size());
   ParallelFor(fits.size(), [&](size_t b) {
     if (!fits[b].Doubtful() && bones.bones[b].voxels >= kTellingVoxels)
-      stretches[b] = StretchOf(tissue[b], scan, fits[b].scan_from_template);
+      stretches[b] = StretchOf(seen.tissue[b], seen.image, scan, fits[b].scan_from_template);
   });
   const double voxel_mm = std::max(bones.labels.grid.MeanSpacingMm(), scan.grid().MeanSpacingMm());
   std::vector<StretchedBone> out;
@@ -118,9 +118,8 @@ std::string WhyOf(const std::vector<StretchedBone>& bones) {
 
 }  // namespace
 
-void NameAnotherSize(const BoneSet& bones, std::span<const BoneTissue> tissue, const CubicImage& scan,
-                     BoneFits& fits) {
-  const std::vector<StretchedBone> stretched = StretchesOf(bones, tissue, scan, fits);
+void NameAnotherSize(const BoneSet& bones, const SeenTemplate& seen, const CubicImage& scan, BoneFits& fits) {
+  const std::vector<StretchedBone> stretched = StretchesOf(bones, seen, scan, fits);
   if (!ManyAreOdd(stretched)) return;
   DoubtAll(Doubt::kAnotherSize,
            "the scan shows the bones in another size than the template, " + WhyOf(stretched), fits);

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "pipeline/bones/refine/trust.h"
+#include "pipeline/scans/alike_images.h"
 
 namespace kvx {
 namespace {
@@ -41,18 +42,31 @@ Eigen::Matrix3d Symmetric(const Elements& elements) {
   return out;
 }
 
+// Of the template, as blurred as the scan.
+struct Sample {
+  Eigen::Vector3d from_centre_mm;
+  double value;
+  Eigen::Vector3d gradient;  // per mm
+};
+
 struct Pair {
-  const TissueSample* sample;
+  const Sample* sample;
   Row row;  // derivative of what the scan shows, in the template's greys; then its grey, and 1
   double trust = 1;
 };
 
 class StretchFit {
  public:
-  StretchFit(const BoneTissue& tissue, const CubicImage& scan, const RigidTransform& pose)
-      : tissue_(tissue), scan_(scan), pose_(pose) {
+  StretchFit(const BoneTissue& tissue, const CubicImage& template_image, const CubicImage& scan,
+             const RigidTransform& pose)
+      : tissue_(tissue),
+        alike_(Liken(template_image.grid(), scan.grid(), pose)),
+        scan_(scan, alike_.b_sd_mm),
+        pose_(pose) {
+    const BlurredImage seen(template_image, alike_.a_sd_mm);
     for (const TissueSample& sample : tissue.samples) {
-      if (sample.away_mm <= tissue.voxel_mm && sample.own_weight >= kMostlyOwn) samples_.push_back(&sample);
+      if (sample.away_mm <= tissue.voxel_mm && sample.own_weight >= kMostlyOwn)
+        samples_.push_back(AsBlurred(sample, seen));
     }
   }
 
@@ -68,20 +82,29 @@ class StretchFit {
   }
 
  private:
+  Sample AsBlurred(const TissueSample& sample, const BlurredImage& seen) const {
+    Sample out{sample.from_centre_mm, sample.value, sample.gradient};
+    Eigen::Vector3d per_voxel;
+    const PointMm at{tissue_.centre.lps + sample.from_centre_mm};
+    if (seen.blurs() && seen.At(seen.grid().ToVox(at).ijk, out.value, per_voxel))
+      out.gradient = seen.grid().VoxFromMm().transpose() * per_voxel;
+    return out;
+  }
+
   void Look() {
     pairs_.clear();
     const Eigen::Matrix3d vox_from_mm = scan_.grid().VoxFromMm();
     const Eigen::Matrix3d template_from_scan = pose_.rotation.toRotationMatrix().transpose();
-    for (const TissueSample* sample : samples_) {
-      const PointMm at = pose_ * PointMm{tissue_.centre.lps + stretch_ * sample->from_centre_mm};
+    for (const Sample& sample : samples_) {
+      const PointMm at = pose_ * PointMm{tissue_.centre.lps + stretch_ * sample.from_centre_mm};
       double in_scan;
       Eigen::Vector3d per_voxel;
       if (!scan_.At(scan_.grid().ToVox(at).ijk, in_scan, per_voxel)) continue;
       const Eigen::Vector3d scan_slope = template_from_scan * (vox_from_mm.transpose() * per_voxel);
       // The mean of both images' slopes halves what noise adds to either.
-      const Eigen::Vector3d slope = 0.5 * (gain_ * scan_slope + sample->gradient);
-      Pair pair{sample, {}};
-      pair.row << sample->from_centre_mm.cross(slope), slope, Between(slope, sample->from_centre_mm), in_scan,
+      const Eigen::Vector3d slope = 0.5 * (gain_ * scan_slope + sample.gradient);
+      Pair pair{&sample, {}};
+      pair.row << sample.from_centre_mm.cross(slope), slope, Between(slope, sample.from_centre_mm), in_scan,
           1;
       pairs_.push_back(pair);
     }
@@ -140,8 +163,9 @@ class StretchFit {
   }
 
   const BoneTissue& tissue_;
-  const CubicImage& scan_;
-  std::vector<const TissueSample*> samples_;
+  const Likening alike_;
+  const BlurredImage scan_;
+  std::vector<Sample> samples_;
   std::vector<Pair> pairs_;
   RigidTransform pose_;
   Eigen::Matrix3d stretch_ = Eigen::Matrix3d::Identity();
@@ -156,9 +180,9 @@ double SdAlong(const BoneStretch& stretch, const Eigen::Vector3d& axis) {
   return std::sqrt(std::max(0.0, along.dot(stretch.covariance * along)));
 }
 
-std::optional<BoneStretch> StretchOf(const BoneTissue& tissue, const CubicImage& scan,
-                                     const RigidTransform& scan_from_template) {
-  return StretchFit(tissue, scan, scan_from_template).Run();
+std::optional<BoneStretch> StretchOf(const BoneTissue& tissue, const CubicImage& template_image,
+                                     const CubicImage& scan, const RigidTransform& scan_from_template) {
+  return StretchFit(tissue, template_image, scan, scan_from_template).Run();
 }
 
 }  // namespace kvx

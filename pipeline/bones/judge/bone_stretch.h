@@ -18,8 +18,10 @@ struct BoneStretch {
 double SdAlong(const BoneStretch& stretch, const Eigen::Vector3d& axis);
 
 // By Gauss-Newton from the pose as it was found, which may turn and shift with it. Nothing where the scan
-// shows less than half of the bone. `scan` in the contrast of the image that `tissue` was sampled from.
-std::optional<BoneStretch> StretchOf(const BoneTissue& tissue, const CubicImage& scan,
-                                     const RigidTransform& scan_from_template);
+// shows less than half of the bone. `scan` in the contrast of `template_image`, which `tissue` was sampled
+// from. Both are looked at as if their voxels were alike: ends of bones that are blurred more seem to lie
+// farther in.
+std::optional<BoneStretch> StretchOf(const BoneTissue& tissue, const CubicImage& template_image,
+                                     const CubicImage& scan, const RigidTransform& scan_from_template);
 
 }  // namespace kvx

@@ -92,12 +92,18 @@ bool HoldsDicomImage(const std::filesystem::path& folder) {
 }  // namespace
 
 std::filesystem::path MaskOf(const std::filesystem::path& folder, const std::string& bone) {
+  std::filesystem::path found;
   for (const char* ending : kEndings) {
     std::error_code ignored;
     const std::filesystem::path file = folder / (bone + ending);
-    if (std::filesystem::is_regular_file(file, ignored)) return file;
+    if (!std::filesystem::is_regular_file(file, ignored)) continue;
+    if (!found.empty())
+      throw InputError("the folder of bones.labels holds two masks of bone '" + bone + "', " +
+                       found.filename().string() + " and " + file.filename().string() +
+                       "; leave there the one that is meant");
+    found = file;
   }
-  return {};
+  return found;
 }
 
 bool HoldsMasks(const std::filesystem::path& path, const std::vector<StudyBone>& bones) {

@@ -10,7 +10,8 @@
 
 namespace kvx {
 
-// The bone's file, of any format that ReadLabels takes; empty where the folder has none.
+// The bone's file, of any format that ReadLabels takes; empty where the folder has none. Throws InputError
+// where it has two: which one is out of date nobody can tell.
 std::filesystem::path MaskOf(const std::filesystem::path& folder, const std::string& bone);
 
 // Whether `path` is a folder of masks, of any of `bones` or no DICOM images; other folders are DICOM label

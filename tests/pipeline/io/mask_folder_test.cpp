@@ -62,6 +62,16 @@ TEST_F(MaskFolder, TheFirstOfTwoBonesHasTheVoxelsOfBoth) {
   EXPECT_EQ(ReadMasks(folder_.path(), {{1, "femur", ""}}).shared_voxels, Shared());
 }
 
+// Exported again in another format beside the old one.
+TEST_F(MaskFolder, TwoMasksOfABoneAreRefused) {
+  Write("femur.nii.gz", {1, 0, 0});
+  Write("femur.nrrd", {0, 1, 0});
+  Write("tibia.nrrd", {0, 0, 1});
+  EXPECT_THAT(Complaint({{1, "femur", ""}, {2, "tibia", "femur"}}),
+              HasSubstr("two masks of bone 'femur', femur.nii.gz and femur.nrrd"));
+  EXPECT_THAT(Read({{2, "tibia", ""}}), ElementsAre(0, 0, 2));
+}
+
 TEST_F(MaskFolder, AnEmptyMaskIsABoneWithoutVoxels) {
   Write("femur.mha", {1, 0, 0});
   Write("tibia.mha", {0, 0, 0});

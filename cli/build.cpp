@@ -36,7 +36,7 @@ void PrintSummary(const ModelManifest& manifest, double wall_seconds) {
                 scan.name.c_str(), before.ssd, after.ssd, before.cc, after.cc, before.mi, after.mi,
                 100 * scan.folded_fraction);
   }
-  std::printf("digest %s\n%.1f s now, %.1f s with everything made anew\n",
+  std::printf("digest %s\n%.1f s now; its stages took %.1f s, some of them side by side\n",
               manifest.ContentDigest().Hex().c_str(), wall_seconds, manifest.seconds.at("total"));
 }
 

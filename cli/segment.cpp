@@ -65,7 +65,7 @@ Task TaskOf(const SegmentArguments& arguments) {
   if (study && !arguments.region.empty())
     throw UsageError("a study names its own region; leave --region out");
   if (study) return TaskOfStudy(arguments);
-  if (given != 1) throw UsageError("give --seeds or --threshold");
+  if (given != 1) throw UsageError("give one of --seeds and --threshold");
   RequireThere(arguments.scan);
   if (!arguments.seeds.empty()) RequireThere(arguments.seeds);
   const std::string region = arguments.region.empty() ? "custom" : arguments.region;

@@ -127,6 +127,14 @@ TEST_F(Usage, WrongCommandLinesAreUsageErrors) {
   }
 }
 
+TEST_F(Usage, BothStrokesAndAThresholdAreOneTooMany) {
+  const std::string scan = File("scan.nii", "never read"), seeds = File("seeds.nii", "never read");
+  const Ended both =
+      Run({"segment", scan, "--seeds", seeds, "--threshold", "auto", "--out", File("o.nii.gz")});
+  ExpectFailure(both, kUsage);
+  EXPECT_THAT(both.err, HasSubstr("give one of --seeds and --threshold"));
+}
+
 TEST_F(Usage, ASeedIsAWholeNumberThatIsKept) {
   for (const char* seed : {"-1", "18446744073709551616", "1e3", "1.5", "0x10", "seven", "+1"}) {
     const Ended ended = Run({"phantom", "knee", "--out", File("d"), "--seed", seed});

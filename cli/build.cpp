@@ -21,12 +21,6 @@ struct BuildArguments {
   PaperOptions paper;
 };
 
-void WarnLimited(const PaperOptions& paper) {
-  if (paper.max_blocks == 0 && paper.max_seconds == 0) return;
-  Warn("the registration was limited: blocks that were not reached are where skinning puts them");
-  if (paper.max_seconds > 0) Warn("a limit in seconds does not give the same model twice; --max-blocks does");
-}
-
 void PrintSummary(const ModelManifest& manifest, double wall_seconds) {
   std::printf("model '%s' of %zu scans on the template '%s', %s method\n", manifest.name.c_str(),
               manifest.scans.size() + 1, manifest.template_scan.c_str(), manifest.method.c_str());
@@ -60,7 +54,6 @@ void Run(const BuildArguments& arguments, const CommandContext& context) {
   bar.Finish();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   for (const std::string& warning : manifest.warnings) Warn(warning);
-  WarnLimited(options.paper);
   if (context.json)
     PrintDocument(InfoJson(Model::Load(arguments.out, arguments.artifacts)));
   else

@@ -230,6 +230,8 @@ TEST_F(ModelOptions, ThePapersMethodStopsWhereItIsTold) {
   EXPECT_THAT(blocks.err,
               testing::Not(HasSubstr("where tissue went is not sure")));  // it states no confidence
   const json info = RunJson({"info", At("m")});
+  EXPECT_THAT(info["warnings"].dump(), HasSubstr("the registration was limited"))
+      << "who gets the model later";
   for (const json& scan : info["scans"]) {
     EXPECT_EQ(scan["control_points"], 24);
     EXPECT_EQ(scan["confidence_percent"], nullptr);

@@ -70,6 +70,7 @@ class Build {
     steps_.moments->Make({});  // all examples with each other, at some of their voxels
     Complete();
     CutIntoBricks();
+    if (options_.method == RegistrationMethod::kPaper) AddWarnings(LimitWarnings(options_.paper));
     return Manifest();
   }
 

@@ -40,6 +40,15 @@ std::vector<std::pair<std::string, size_t>> WithNames(const BoneSet& bones,
 
 }  // namespace
 
+std::vector<std::string> LimitWarnings(const PaperOptions& paper) {
+  if (paper.max_blocks == 0 && paper.max_seconds == 0) return {};
+  std::vector<std::string> warnings = {
+      "the registration was limited: blocks that were not reached are where skinning puts them"};
+  if (paper.max_seconds > 0)
+    warnings.emplace_back("a limit in seconds does not give the same model twice; one in blocks does");
+  return warnings;
+}
+
 std::vector<std::string> SameScanWarnings(const std::vector<std::pair<std::string, Digest>>& scans) {
   std::map<Digest, std::vector<std::string>> names_of;
   for (const auto& [name, file] : scans) names_of[file].push_back("'" + name + "'");

@@ -8,8 +8,12 @@
 #include "core/digest.h"
 #include "core/scan.h"
 #include "core/study.h"
+#include "pipeline/registration/paper/paper_options.h"
 
 namespace kvx {
+
+// Lines where the published method was told to end early.
+std::vector<std::string> LimitWarnings(const PaperOptions& paper);
 
 // A line for each file that several scans share: it was chosen twice. Of each scan its name and file.
 std::vector<std::string> SameScanWarnings(const std::vector<std::pair<std::string, Digest>>& scans);

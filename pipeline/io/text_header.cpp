@@ -209,8 +209,10 @@ bool NamesSegment(const TextHeader& nrrd, size_t index) {
 // Before its version 4.11, 3D Slicer gave each segment a layer of its own, 1 inside, and did not say so.
 Segment SegmentAt(const TextHeader& nrrd, size_t index) {
   const std::string key = KeyOfSegment(index);
-  if (!nrrd.notes.contains(key + "labelvalue")) return {int(index), 1};
-  return {WholeNumber(NoteOf(nrrd, key + "layer")), WholeNumber(NoteOf(nrrd, key + "labelvalue"))};
+  const auto note = nrrd.notes.find(key + "name");
+  const std::string name = note == nrrd.notes.end() ? "" : note->second;
+  if (!nrrd.notes.contains(key + "labelvalue")) return {int(index), 1, name};
+  return {WholeNumber(NoteOf(nrrd, key + "layer")), WholeNumber(NoteOf(nrrd, key + "labelvalue")), name};
 }
 
 }  // namespace

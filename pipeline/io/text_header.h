@@ -62,9 +62,10 @@ Rescale RescaleOf(const TextHeader& header);
 std::string SpaceOf(const TextHeader& nrrd);
 
 // Where a segment of a NRRD segmentation is, as 3D Slicer writes it: in which of the values that a voxel has,
-// and which value.
+// and which value; and what the file calls it.
 struct Segment {
   int layer = 0, value = 0;
+  std::string name;
 };
 bool NamesSegments(const TextHeader& nrrd);  // a segmentation, by its own account
 // In the file's order; none where it says nothing of segments. Throws InputError for what makes no sense.

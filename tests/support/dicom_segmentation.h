@@ -46,11 +46,16 @@ inline std::vector<SegmentFrame> FramesOf(const SegmentationFile& of) {
   return frames;
 }
 
+inline DicomBytes SegmentNumbered(int segment) {
+  return DicomBytes()
+      .Short(0x00620004, uint16_t(segment))
+      .Text(0x00620005, "LO", "Bone " + std::to_string(segment));
+}
+
 inline void WriteSegmentation(const std::filesystem::path& path, const SegmentationFile& of) {
   const std::vector<SegmentFrame> frames = FramesOf(of);
   std::vector<DicomBytes> list, groups;
-  for (int segment = 1; segment <= of.segments; ++segment)
-    list.push_back(DicomBytes().Short(0x00620004, uint16_t(segment)));
+  for (int segment = 1; segment <= of.segments; ++segment) list.push_back(SegmentNumbered(segment));
   std::string voxels;
   std::vector<std::string> fragments;
   for (const SegmentFrame& frame : frames) {

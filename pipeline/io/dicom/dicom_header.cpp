@@ -33,7 +33,8 @@ const Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kIntercept(0x
 const Tag kFloatPixels(0x7fe0, 0x0008), kDoublePixels(0x7fe0, 0x0009);  // of parametric maps alone
 const Tag kSopClass(0x0008, 0x0016), kSegmentSequence(0x0062, 0x0002), kSegmentationType(0x0062, 0x0001),
     kMostFraction(0x0062, 0x000e), kSpacingBetween(0x0018, 0x0088);
-const Tag kSegmentOfFrame(0x0062, 0x000a), kSegmentReferred(0x0062, 0x000b), kSegmentNumber(0x0062, 0x0004);
+const Tag kSegmentOfFrame(0x0062, 0x000a), kSegmentReferred(0x0062, 0x000b), kSegmentNumber(0x0062, 0x0004),
+    kSegmentLabel(0x0062, 0x0005);
 const Tag kPlanePosition(0x0020, 0x9113), kPlaneOrientation(0x0020, 0x9116), kPixelMeasures(0x0028, 0x9110);
 const Tag kPixelValues(0x0028, 0x9145), kModalityTable(0x0028, 0x3000);
 
@@ -234,12 +235,14 @@ DicomContent ContentOf(const DataSet& set) {
 }
 
 void ReadSegments(const DataSet& set, FrameTags& tags, DicomFile& file) {
+  DicomSequences alive;
+  const auto segments = ItemsOf(set, kSegmentSequence, alive);
+  for (const DataSet* segment : segments)
+    file.segment_names[int(NumberAt(*segment, kSegmentNumber))] = TextOf(*segment, kSegmentLabel);
   file.numbered = TextOf(set, kSopClass) == kLabelMap || TextOf(set, kSegmentationType) == "LABELMAP";
   if (file.numbered) return;
   if (TextOf(set, kSegmentationType) == "FRACTIONAL")
     file.certain = std::max<size_t>(1, NumberAt(set, kMostFraction));
-  DicomSequences alive;
-  const auto segments = ItemsOf(set, kSegmentSequence, alive);
   const size_t only = segments.size() == 1 ? std::max<size_t>(1, NumberAt(*segments[0], kSegmentNumber)) : 0;
   for (size_t f = 0; f < file.frames.size(); ++f) {
     const size_t segment = tags.Number(f, kSegmentOfFrame, kSegmentReferred);

@@ -1,6 +1,7 @@
 // What of a DICOM file's header places its images in the patient. Voxels are not touched.
 #pragma once
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -28,10 +29,11 @@ struct DicomFile {
   bool localiser = false;    // by its own account
   DicomContent content = DicomContent::kBody;
   int columns = 0, rows = 0;
-  bool numbered = false;           // a segmentation whose voxels are the numbers of their segments
-  size_t certain = 0;              // of a segmentation of probabilities: the value of what is sure
-  double between_mm = 0;           // from plane to plane, where it says so
-  std::vector<DicomFrame> frames;  // in the file's order; none where it does not say where they lie
+  bool numbered = false;                     // a segmentation whose voxels are the numbers of their segments
+  size_t certain = 0;                        // of a segmentation of probabilities: the value of what is sure
+  std::map<int, std::string> segment_names;  // of a segmentation: what it calls its segments, by number
+  double between_mm = 0;                     // from plane to plane, where it says so
+  std::vector<DicomFrame> frames;            // in the file's order; none where it does not say where they lie
   // The number of frames by the file's word, and of those whose places it tells, where they differ.
   std::optional<std::pair<size_t, size_t>> miscounted;
   Rescale rescale;            // of all frames, by the file's word

@@ -10,6 +10,8 @@
 #include "core/host/parallel.h"
 #include "core/region_presets.h"
 #include "pipeline/artifacts/leftovers.h"
+#include "pipeline/io/mask_folder.h"
+#include "pipeline/io/segment_names.h"
 #include "pipeline/model/build/progress_shares.h"
 #include "pipeline/model/build/study_wiring.h"
 #include "pipeline/model/files/model_folder.h"
@@ -151,6 +153,9 @@ class Build {
         AddWarnings(WarningsOf(steps_.segmented->Load(), steps_.bones->Load().NamesByLabel()));
       } else {
         AddWarnings(LabelWarnings(steps_.bones->Load()));
+        if (!HoldsMasks(study_.bone_labels, study_.bones))
+          AddWarnings(
+              SegmentNameWarnings(steps_.bones->Load(), ReadSegmentNames(study_.bone_labels), study_.region));
         AddWarnings(MisplacedLabelWarnings(steps_.template_scan->Load().volume, steps_.bones->Load().labels));
       }
       AddWarnings(NameWarnings(steps_.bones->Load(), study_.region));

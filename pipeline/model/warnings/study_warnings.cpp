@@ -8,6 +8,7 @@
 
 #include "core/numbers/quantile.h"
 #include "core/region_presets.h"
+#include "core/text/lower_case.h"
 #include "pipeline/bones/bone_set/border_edges.h"
 #include "pipeline/bones/bone_set/far_parents.h"
 #include "pipeline/model/warnings/listed_names.h"
@@ -127,6 +128,24 @@ std::vector<std::string> SharedVoxelWarnings(const std::vector<std::pair<std::st
   std::vector<std::string> warnings;
   Tell("masks share voxels, which are the bone's that is listed first and were taken from", shared, warnings);
   return warnings;
+}
+
+std::vector<std::string> SegmentNameWarnings(const BoneSet& bones, const std::map<int, std::string>& names,
+                                             Region region) {
+  std::vector<std::string> otherwise;
+  for (const Bone& bone : bones.bones) {
+    const auto named = names.find(bone.label);
+    if (named == names.end()) continue;
+    const std::string there = LowerCase(named->second);
+    const bool of_a_bone =
+        FindPreset(region, there) || std::ranges::count(bones.bones, there, &Bone::name) > 0;
+    if (of_a_bone && there != LowerCase(bone.name))
+      otherwise.push_back(bone.name + " (label " + std::to_string(bone.label) + ", there " + there + ")");
+  }
+  return Naming(
+      "the segmentation itself calls these bones by the names of others; say in bones.list which label is "
+      "which bone: ",
+      otherwise);
 }
 
 std::vector<std::string> MissingBoneWarnings(const BoneSet& bones, Region region) {

@@ -1,5 +1,6 @@
 // What a user is told about a study that may not be what was meant: its files, label map and tree.
 #pragma once
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,6 +39,11 @@ std::vector<std::string> LabelWarnings(const BoneSet& bones);
 
 // A line where bones' masks hold voxels that are another's: of each bone its name and how many.
 std::vector<std::string> SharedVoxelWarnings(const std::vector<std::pair<std::string, size_t>>& shared);
+
+// A line for bones that the segmentation itself calls by another bone's name: DICOM numbers segments without
+// gaps, so a knee without its fibula has the patella in the fibula's place. `names`: by label.
+std::vector<std::string> SegmentNameWarnings(const BoneSet& bones, const std::map<int, std::string>& names,
+                                             Region region);
 
 // A line for bones of the region that the label map lacks, though it has others.
 std::vector<std::string> MissingBoneWarnings(const BoneSet& bones, Region region);

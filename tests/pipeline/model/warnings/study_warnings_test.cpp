@@ -66,6 +66,18 @@ TEST(TemplatePoseWarnings, NameBonesThatAreMovedInTheTemplate) {
   EXPECT_THAT(TemplatePoseWarnings(study), ElementsAre(testing::EndsWith("another scan: tibia")));
 }
 
+// A SEG of femur and patella numbers them 1 and 2, and 2 is the preset's tibia.
+TEST(SegmentNameWarnings, NameBonesThatTheFileCallsByAnothersName) {
+  const BoneSet set = TwoBars();
+  EXPECT_THAT(SegmentNameWarnings(set, {}, Region::kKnee), IsEmpty());
+  EXPECT_THAT(SegmentNameWarnings(set, {{3, "Femur"}, {7, "Segment_2"}, {9, "patella"}}, Region::kKnee),
+              IsEmpty());
+  EXPECT_THAT(SegmentNameWarnings(set, {{3, "femur"}, {7, "Patella"}}, Region::kKnee),
+              ElementsAre(testing::EndsWith(": tibia (label 7, there patella)")));
+  EXPECT_THAT(SegmentNameWarnings(set, {{3, "tibia"}, {7, "patella"}}, Region::kCustom),
+              ElementsAre(testing::EndsWith(": femur (label 3, there tibia)")));
+}
+
 TEST(LabelWarnings, NameLabelsOfNoBone) {
   BoneSet set = TwoBars();
   EXPECT_THAT(LabelWarnings(set), IsEmpty());

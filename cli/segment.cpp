@@ -35,7 +35,8 @@ struct Task {
   SegmentBones::Options options;
   Region region = Region::kCustom;
   std::vector<StudyBone> list;
-  std::vector<std::string> unread_fields;  // of the study
+  std::vector<std::string> unread_fields;    // of the study
+  std::vector<std::filesystem::path> scans;  // of the study, all of them
 };
 
 Task TaskOfStudy(const SegmentArguments& arguments) {
@@ -49,9 +50,11 @@ Task TaskOfStudy(const SegmentArguments& arguments) {
             {study.bone_level_hu, {}},
             study.region,
             study.bones,
-            study.unread_fields};
+            study.unread_fields,
+            {}};
   for (const StudyBone& bone : study.bones) task.options.listed.push_back(bone.label);
   for (const StudyScan& scan : study.scans) {
+    task.scans.push_back(scan.volume);
     if (scan.name == study.template_scan) task.scan = scan.volume;
   }
   return task;
@@ -69,7 +72,7 @@ Task TaskOf(const SegmentArguments& arguments) {
   RequireThere(arguments.scan);
   if (!arguments.seeds.empty()) RequireThere(arguments.seeds);
   const std::string region = arguments.region.empty() ? "custom" : arguments.region;
-  Task task{arguments.scan, arguments.seeds, arguments.scan.string(), {}, RegionFromName(region), {}, {}};
+  Task task{arguments.scan, arguments.seeds, arguments.scan.string(), {}, RegionFromName(region), {}, {}, {}};
   if (arguments.seeds.empty() && arguments.threshold != "auto") {
     task.options.level_hu = ParseFinite(arguments.threshold);
     if (!task.options.level_hu) throw UsageError("--threshold is a level in HU, or auto");
@@ -129,6 +132,8 @@ void Run(const SegmentArguments& arguments, const CommandContext& context) {
   RequireWritableExtension(arguments.out);
   RequireMayWrite(arguments.out);
   RequireOther(arguments.out, task.scan, "the scan");
+  for (const std::filesystem::path& scan : task.scans)
+    RequireOther(arguments.out, scan, "a scan of the study");
   if (!task.seeds.empty()) RequireOther(arguments.out, task.seeds, "the strokes");
   if (!arguments.previous.empty() && task.seeds.empty())
     throw UsageError("--previous goes with strokes; a threshold starts from nothing");

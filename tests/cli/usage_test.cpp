@@ -135,6 +135,17 @@ TEST_F(Usage, BothStrokesAndAThresholdAreOneTooMany) {
   EXPECT_THAT(both.err, HasSubstr("give one of --seeds and --threshold"));
 }
 
+// The template's labels would have stood where another scan was.
+TEST_F(Usage, SegmentTakesTheLabelsToNoScanOfTheStudy) {
+  for (const char* file : {"rest.nii", "bent.nii", "strokes.nii"}) File(file, "never read");
+  const std::string study = File("study.json", R"({"name": "s", "region": "knee", "template": "rest",
+      "scans": [{"name": "rest", "volume": "rest.nii"}, {"name": "bent", "volume": "bent.nii"}],
+      "bones": {"seeds": "strokes.nii"}})");
+  const Ended ended = Run({"segment", study, "--out", File("bent.nii", "never read")});
+  ExpectFailure(ended, kUsage);
+  EXPECT_THAT(ended.err, HasSubstr("would take the place of a scan of the study"));
+}
+
 TEST_F(Usage, ASeedIsAWholeNumberThatIsKept) {
   for (const char* seed : {"-1", "18446744073709551616", "1e3", "1.5", "0x10", "seven", "+1"}) {
     const Ended ended = Run({"phantom", "knee", "--out", File("d"), "--seed", seed});

@@ -15,7 +15,7 @@ namespace kvx {
 
 namespace {
 
-constexpr double kMuchUnsure = 0.25;  // of the body; scans of every day have a tenth at most
+constexpr double kMuchUnsure = 0.25;  // of the body; phantoms without added noise have a sixth at most
 constexpr double kMuchLess = 0.03;    // of a measure; noise and sampling take less
 
 // "scan 'a', bones 'x', 'y' are doubtful: ..."

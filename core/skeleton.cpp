@@ -1,8 +1,11 @@
 // Degrees of freedom and forward kinematics.
 #include "core/skeleton.h"
 
+#include <algorithm>
+
 #include "core/errors.h"
 #include "core/joint_values.h"
+#include "core/text/listed.h"
 
 namespace kvx {
 
@@ -24,13 +27,12 @@ std::vector<std::string> Skeleton::DofNames(const std::vector<std::string>& bone
 
 int Skeleton::DofIndex(std::string_view qualified_name, const std::vector<std::string>& bone_names) const {
   const std::vector<std::string> names = DofNames(bone_names);
-  std::string known;
-  for (size_t d = 0; d < names.size(); ++d) {
-    if (names[d] == qualified_name) return int(d);
-    known += (d ? ", " : "") + names[d];
-  }
-  throw NotFound("there is no degree of freedom '" + std::string(qualified_name) +
-                 "'; this model has: " + known);
+  const auto found = std::ranges::find(names, qualified_name);
+  if (found != names.end()) return int(found - names.begin());
+  const std::string missing = "there is no degree of freedom '" + std::string(qualified_name) + "'; ";
+  if (names.empty())
+    throw NotFound(missing + "none of this model's joints has any: pose it by a scan or by bone transforms");
+  throw NotFound(missing + "this model has: " + Listed(names));
 }
 
 RigidTransform JointMotion(const Joint& joint, const double* angles_rad) {

@@ -1,6 +1,7 @@
 // Forward kinematics on a chain whose poses can be written down.
 #include "core/skeleton.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "core/errors.h"
@@ -59,7 +60,16 @@ TEST(Skeleton, NamesItsDegreesOfFreedom) {
   EXPECT_EQ(Chain().DofCount(), 3);
   EXPECT_EQ(Chain().FirstDof(2), 2);
   EXPECT_EQ(Chain().DofIndex("c.flexion", names), 2);
-  EXPECT_THROW(Chain().DofIndex("a.flexion", names), NotFound);
+  EXPECT_THAT([&] { Chain().DofIndex("a.flexion", names); },
+              testing::ThrowsMessage<NotFound>(testing::EndsWith("b.flexion, b.abduction, c.flexion")));
+}
+
+// A list of nothing is no advice.
+TEST(Skeleton, WithoutDegreesOfFreedomSaysHowElseToPose) {
+  const Skeleton one{.joints = {Joint{}}};
+  EXPECT_THAT(
+      [&] { one.DofIndex("a.flexion", {"a"}); },
+      testing::ThrowsMessage<NotFound>(testing::HasSubstr("pose it by a scan or by bone transforms")));
 }
 
 }  // namespace

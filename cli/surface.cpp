@@ -78,8 +78,10 @@ void AddSurface(CLI::App& program, CommandContext& context) {
       ->check(CLI::Range(0.0, 5.0))
       ->capture_default_str();
   command
-      ->add_option("--largest-error", arguments->options.largest_error_vox,
-                   "How far the simplified surface may be from the full one, voxels; 0 keeps every triangle")
+      ->add_option(
+          "--largest-error", arguments->options.largest_error_vox,
+          "About how far the simplified surface may be from the full one, voxels (single places twice "
+          "that); 0 keeps every triangle")
       ->check(CLI::Range(0.0, 5.0))
       ->capture_default_str();
   AddOut(*command, arguments->out, ".glb: one node per bone, metres, y up; .stl: LPS mm");

@@ -7,7 +7,7 @@ namespace kvx {
 
 struct SurfaceOptions {
   double smoothing_vox = 1.0;      // standard deviation of the Gaussian on the distance to the surface
-  double largest_error_vox = 0.1;  // of the simplified mesh against the full one; 0: every triangle stays
+  double largest_error_vox = 0.1;  // of the simplified mesh (simplified_mesh.h); 0: every triangle stays
 };
 
 // The signed distance to the set's border, smoothed, cut where the surface encloses the volume of the set's

@@ -11,6 +11,7 @@
 #include "pipeline/io/surface_file.h"
 #include "pipeline/surface/level_surface.h"
 #include "pipeline/surface/mask_surface.h"
+#include "pipeline/surface/simplified_mesh.h"
 #include "tests/support/fixtures.h"
 
 namespace kvx {
@@ -73,6 +74,27 @@ TEST(LevelSurface, AnyFunctionGivesAClosedSurface) {
   EXPECT_GT(mesh.triangles.size(), 1000u);
   EXPECT_TRUE(IsClosed(mesh));
   EXPECT_GT(EnclosedVolumeMm3(mesh), 0);
+}
+
+// Of a sphere every place of a triangle is known to lie as far off as its distance from the middle says.
+TEST(SimplifiedMesh, NoPlaceLiesMoreThanTwiceAsFarOffAsWasAllowed) {
+  const Grid grid = FineGrid();
+  const double radius_mm = 11;
+  const TriangleMesh full = LevelSurface(SphereDistance(grid, radius_mm));
+  for (const double largest_mm : {0.1, 0.4, 1.5}) {
+    const TriangleMesh mesh = SimplifiedMesh(full, largest_mm);
+    EXPECT_LT(mesh.triangles.size(), full.triangles.size() / 4);
+    double farthest_mm = 0;
+    for (const auto& [a, b, c] : mesh.triangles) {
+      const Eigen::Vector3f corner = mesh.vertices_mm[a],
+                            middle = (corner + mesh.vertices_mm[b] + mesh.vertices_mm[c]) / 3;
+      for (const Eigen::Vector3f& x : {corner, middle})
+        farthest_mm =
+            std::max(farthest_mm, std::abs((x.cast<double>() - Middle(grid).lps).norm() - radius_mm));
+    }
+    EXPECT_LT(farthest_mm, 2 * largest_mm);
+    EXPECT_GT(farthest_mm, largest_mm / 4) << "more triangles than are needed";
+  }
 }
 
 TEST(LevelSurface, NothingInsideIsNoSurface) {

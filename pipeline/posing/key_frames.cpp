@@ -79,7 +79,7 @@ Motion::Motion(const PoseResolver& model, KeyFrames frames, DeformationMode mode
         "cubic interpolation needs key frames given as joint angles; use slerp for bones and scans");
 }
 
-JointAngles Motion::AnglesAt(size_t after, double time_s) const {
+JointAngles Motion::AnglesBetween(size_t after, double time_s) const {
   const KeyFrame &a = frames_.frames[after - 1], &b = frames_.frames[after];
   const double length = b.time_s - a.time_s, share = (time_s - a.time_s) / length;
   if (frames_.interpolation == Interpolation::kLinear)
@@ -111,18 +111,30 @@ BonePose Motion::BonesBetween(size_t after, double share) const {
   return out;
 }
 
-ResolvedPose Motion::At(double time_s) const {
+Motion::Place Motion::PlaceOf(double time_s) const {
   size_t after = 0;
   while (after < frames_.frames.size() && frames_.frames[after].time_s < time_s + kSameTime) ++after;
   const size_t before = after == 0 ? 0 : after - 1;
   const bool on_frame =
       after == 0 || after == frames_.frames.size() || time_s < frames_.frames[before].time_s + kSameTime;
+  return {before, on_frame};
+}
+
+bool Motion::IsByAngles() const { return !angles_.empty() && frames_.interpolation != Interpolation::kSlerp; }
+
+ResolvedPose Motion::At(double time_s) const {
+  const auto [before, on_frame] = PlaceOf(time_s);
   if (on_frame) return model_.Resolve(frames_.frames[before].pose, mode_);
-  if (!angles_.empty() && frames_.interpolation != Interpolation::kSlerp)
-    return model_.ResolveAngles(AnglesAt(after, time_s), mode_);
+  if (IsByAngles()) return model_.ResolveAngles(AnglesBetween(before + 1, time_s), mode_);
   const double share = (time_s - frames_.frames[before].time_s) /
-                       (frames_.frames[after].time_s - frames_.frames[before].time_s);
-  return model_.Resolve(BonesBetween(after, share), mode_);
+                       (frames_.frames[before + 1].time_s - frames_.frames[before].time_s);
+  return model_.Resolve(BonesBetween(before + 1, share), mode_);
+}
+
+JointAngles Motion::AnglesAt(double time_s) const {
+  if (!IsByAngles()) return AnalysePose(model_.fit.skeleton, At(time_s).scan_from_template).angles;
+  const auto [before, on_frame] = PlaceOf(time_s);
+  return on_frame ? angles_[before] : AnglesBetween(before + 1, time_s);
 }
 
 }  // namespace kvx

@@ -35,9 +35,18 @@ class Motion {
   Motion(const PoseResolver& model, KeyFrames frames, DeformationMode mode);
   // Held before the first and after the last key frame; at a key frame's time exactly that frame's pose.
   ResolvedPose At(double time_s) const;
+  // Of that pose: those that are asked for, as `At` looks them up in pose space; where bones are
+  // interpolated, those that the bones show.
+  JointAngles AnglesAt(double time_s) const;
 
  private:
-  JointAngles AnglesAt(size_t after, double time_s) const;
+  struct Place {
+    size_t before;  // key frame
+    bool on_frame;
+  };
+  Place PlaceOf(double time_s) const;
+  bool IsByAngles() const;
+  JointAngles AnglesBetween(size_t after, double time_s) const;
   BonePose BonesBetween(size_t after, double share) const;
 
   const PoseResolver model_;

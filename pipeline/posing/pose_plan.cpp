@@ -72,7 +72,7 @@ std::vector<JointAngles> AnglesAlong(const PoseResolver& model, const KeyFrames&
   std::vector<JointAngles> out;
   for (int f = 0; f < count; f += step) {
     times_s.push_back(frames.TimeOf(f));
-    out.push_back(AnalysePose(model.fit.skeleton, motion.At(times_s.back()).scan_from_template).angles);
+    out.push_back(motion.AnglesAt(times_s.back()));
   }
   return out;
 }

@@ -362,6 +362,33 @@ TEST(PosePlan, EigenposesAreOfWhatVaries) {
   EXPECT_NEAR(plan.explained[1], 1, 1e-12);
 }
 
+// 190 degrees are as bones show them -170, which in pose space, and for eigenposes, lies elsewhere.
+TEST(PosePlan, LooksAtTheAnglesThatTheMotionAsksFor) {
+  const Chain chain;
+  for (const auto how : {Interpolation::kLinear, Interpolation::kCubic}) {
+    std::vector<double> times_s;
+    const KeyFrames frames{2, how, {{0, Chain::Asked(150, 0)}, {1, Chain::Asked(190, 10)}}};
+    const std::vector<JointAngles> poses = AnglesAlong(chain.Resolver(), frames, 10, times_s);
+    ASSERT_EQ(poses.size(), 3u);
+    EXPECT_NEAR(DegFromRad(poses[1][0]), 170, 1e-9);
+    EXPECT_NEAR(DegFromRad(poses[2][0]), 190, 1e-9);
+    EXPECT_NEAR(DegFromRad(poses[2][1]), 10, 1e-9);
+  }
+}
+
+// Bones that are interpolated have the angles that they show.
+TEST(PosePlan, ReadsAnglesFromBonesWhereNoneAreGiven) {
+  const Chain chain;
+  std::vector<double> times_s;
+  const PoseVector bent = chain.Bent(40, 20);
+  const BonePose bones{{{"a", bent[0]}, {"b", bent[1]}, {"c", bent[2]}}};
+  const KeyFrames frames{2, Interpolation::kLinear, {{0, Chain::Asked(0, 0)}, {1, bones}}};
+  const std::vector<JointAngles> poses = AnglesAlong(chain.Resolver(), frames, 10, times_s);
+  ASSERT_EQ(poses.size(), 3u);
+  EXPECT_NEAR(DegFromRad(poses[1][0]), 20, 1e-9);
+  EXPECT_NEAR(DegFromRad(poses[2][1]), 20, 1e-9);
+}
+
 TEST(PosePlan, ModelsWithoutMovingJointsHaveNone) {
   const std::vector<JointAngles> poses(3, JointAngles(0));
   EXPECT_THAT(Refusal([&] { PlanPoses(PoseSpace(SkeletonFit()), poses, 1); }),

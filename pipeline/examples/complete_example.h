@@ -36,7 +36,7 @@ class ExampleStack {
 
 struct CompleteExample {
   static constexpr std::string_view kName = "examples_completed";
-  static constexpr int kVersion = 3;
+  static constexpr int kVersion = 4;
   struct Inputs {
     ExampleStack& examples;
     const Artifact<Mask>& body;

@@ -27,7 +27,7 @@ void Fields(A& a, ExampleMoments& v) {
 // takes moments: turn by turn.
 struct CompareExamples {
   static constexpr std::string_view kName = "example_moments";
-  static constexpr int kVersion = 3;
+  static constexpr int kVersion = 4;
   struct Inputs {
     const Artifact<Mask>& body;
     const Artifact<WeightMap>& weights;

@@ -89,7 +89,8 @@ Eigen::MatrixXd OwnParts(const PoseRows& a, const PoseRows& b, double round_rad)
   return out;
 }
 
-// Scans of one pose stand at one place, the first one's; those of the template's pose at the template.
+// Scans of one pose stand at one place, that of the least angles; those of the template's pose at the
+// template.
 PoseRows AtDistinctPoses(const PoseRows& scans, const std::vector<int>& dofs) {
   const DistinctPoses examples = FindDistinctPoses(scans, dofs);
   return (examples.wanted.array() > 0).cast<double>().matrix().transpose() * examples.centres;

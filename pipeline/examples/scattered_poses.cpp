@@ -2,6 +2,7 @@
 #include "pipeline/examples/scattered_poses.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace kvx {
 namespace {
@@ -9,13 +10,25 @@ namespace {
 // Of every angle (0.1 mm of a shift): bones are hardly known better, so nearer poses are one
 constexpr double kSamePoseRad = RadFromDeg(0.1);
 
+// By their angles, so that which of several near poses are one does not depend on the order of the scans.
+std::vector<Eigen::Index> InOrder(const PoseRows& poses) {
+  std::vector<Eigen::Index> order(static_cast<size_t>(poses.rows()));
+  std::iota(order.begin(), order.end(), Eigen::Index(0));
+  std::ranges::stable_sort(order, [&](Eigen::Index k, Eigen::Index l) {
+    const Eigen::RowVectorXd a = poses.row(k), b = poses.row(l);
+    return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+  });
+  return order;
+}
+
 }  // namespace
 
 DistinctPoses FindDistinctPoses(const PoseRows& scans, const std::vector<int>& dofs) {
   std::vector<Eigen::RowVectorXd> centres{Eigen::RowVectorXd::Zero(dofs.size())};
   std::vector<std::vector<int>> members{{}};
-  for (Eigen::Index k = 0; k < scans.rows(); ++k) {
-    const Eigen::RowVectorXd at = scans(k, dofs);
+  const PoseRows poses = scans(Eigen::all, dofs);
+  for (const Eigen::Index k : InOrder(poses)) {
+    const Eigen::RowVectorXd at = poses.row(k);
     const auto same = std::find_if(centres.begin(), centres.end(), [&](const Eigen::RowVectorXd& c) {
       return (c - at).lpNorm<Eigen::Infinity>() < kSamePoseRad;
     });

@@ -5,8 +5,8 @@
 
 namespace kvx {
 
-// Distinct local poses (the template's first), none within 0.1 degrees (0.1 mm) of one before it in every
-// angle, and what each must give: its scans in equal shares, the template nothing.
+// Distinct local poses (the template's first, the others by their angles), none within 0.1 degrees (0.1 mm)
+// of one before it in every angle, and what each must give: its scans in equal shares, the template nothing.
 struct DistinctPoses {
   Eigen::MatrixXd centres;  // poses x `dofs`
   Eigen::MatrixXd wanted;   // poses x scans

@@ -41,7 +41,7 @@ class PosingEngine {
  public:
   // Raised when posed numbers change, those of elastic poses (model/pose_equilibrium.h) too: results kept
   // elsewhere are known by it
-  static constexpr int kVersion = 12;
+  static constexpr int kVersion = 13;
   static constexpr double kMostVoxels = 1e9;  // of a posed grid: beyond it the pose is a mistake
 
   // A posed grid of more than `most_voxels` is refused with InputError.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "core/errors.h"
@@ -148,6 +149,25 @@ TEST(PoseSpace, NothingJumpsWhereAPoseWasScannedTwice) {
         EXPECT_NEAR(AtDegrees(space, d, scan), AtDegrees(space, d + 0.002, scan), most)
             << apart_deg << ", " << d;
     }
+  }
+}
+
+// Of three repeats the middle one is within 0.1 degrees of both others, which are not of each other.
+TEST(PoseSpace, TheOrderOfScansDoesNotMatter) {
+  const std::vector<double> degrees{40, 40.08, 40.16, 70};
+  std::vector<int> order{0, 1, 2, 3};
+  for (const PoseSpaceOptions& options : kAllOptions) {
+    const PoseSpace space(KneeAt(degrees), options);
+    do {
+      std::vector<double> reordered;
+      for (const int k : order) reordered.push_back(degrees[size_t(k)]);
+      const PoseSpace other(KneeAt(reordered), options);
+      for (const double at : {-10.0, 20.0, 39.0, 40.0, 40.08, 40.12, 40.16, 41.0, 55.0, 90.0}) {
+        const JointAngles angles = JointAngles::Constant(1, RadFromDeg(at));
+        const Eigen::MatrixXd expected = space.Coefficients(angles)(Eigen::all, order);
+        EXPECT_LT((other.Coefficients(angles) - expected).cwiseAbs().maxCoeff(), 1e-9) << at;
+      }
+    } while (std::ranges::next_permutation(order).found);
   }
 }
 

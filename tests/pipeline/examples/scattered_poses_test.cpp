@@ -39,8 +39,8 @@ TEST(DistinctPoses, AreNoTwoWithinATenthOfADegree) {
   PoseRows scans(4, 2);
   scans << 1, 0, near, 5, 1 + near, 9, 1 - apart, 0;
   const DistinctPoses found = FindDistinctPoses(scans, {0});
-  EXPECT_EQ(found.centres, (Eigen::MatrixXd{{0}, {1}, {1 - apart}}));
-  EXPECT_EQ(found.wanted, (Eigen::MatrixXd{{0, 0, 0, 0}, {0.5, 0, 0.5, 0}, {0, 0, 0, 1}}));
+  EXPECT_EQ(found.centres, (Eigen::MatrixXd{{0}, {1 - apart}, {1}})) << "by their angles";
+  EXPECT_EQ(found.wanted, (Eigen::MatrixXd{{0, 0, 0, 0}, {0, 0, 0, 1}, {0.5, 0, 0.5, 0}}));
 }
 
 }  // namespace

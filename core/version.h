@@ -3,6 +3,6 @@
 
 namespace kvx {
 
-const char* ProgramVersion();  // "0.99.0"
+const char* ProgramVersion();  // "0.100.0"
 
 }  // namespace kvx

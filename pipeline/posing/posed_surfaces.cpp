@@ -4,6 +4,7 @@
 #include <mutex>
 
 #include "core/host/parallel.h"
+#include "core/voxels/label_mask.h"
 
 namespace kvx {
 namespace {
@@ -11,12 +12,6 @@ namespace {
 constexpr size_t kPointsAtOnce = 4096;
 // Of the largest, by volume: crumbs of tissue at a cut end and cavities are no skin
 constexpr double kLeastPiece = 0.01;
-
-Mask MaskOfLabel(const LabelMap& labels, int label) {
-  Mask out(labels.grid);
-  for (size_t v = 0; v < labels.values.size(); ++v) out.values[v] = labels.values[v] == label ? 1 : 0;
-  return out;
-}
 
 TriangleMesh Mapped(const PosingEngine& engine, const ResolvedPose& pose, const TriangleMesh& mesh) {
   TriangleMesh out = mesh;

@@ -18,7 +18,7 @@
 namespace kvx {
 namespace {
 
-constexpr double kMuscleHu = 60;
+constexpr double kMuscleHu = 60;      // its densest, without contrast medium
 constexpr double kSurelyKept = 0.85;  // of a threshold's parts at other levels
 constexpr double kGapMm = 1.5;        // of a joint, thinner ones are closed by the blur of a voxel
 

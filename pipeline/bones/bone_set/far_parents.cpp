@@ -1,4 +1,5 @@
-// Distances between a few hundred voxels of each bone.
+// A few hundred voxels of each bone tell which bones are far; what is said of a gap is measured by all of
+// them.
 #include "pipeline/bones/bone_set/far_parents.h"
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 
 #include "core/region_presets.h"
 #include "core/voxels/distance_transform.h"
+#include "core/voxels/label_mask.h"
 #include "core/voxels/label_surface.h"
 #include "core/voxels/voxel_box.h"
 
@@ -34,9 +36,7 @@ bool MeetInPreset(const Bone& bone, const Bone& parent, Region region) {
 // bones are no farther apart.
 double LeastGapMm(const LabelMap& whole, int label, int other, double within_mm) {
   const LabelMap labels = Cropped(whole, GrownByMm(BoxOf(whole, label), within_mm, whole.grid));
-  Mask bone(labels.grid);
-  for (size_t v = 0; v < bone.values.size(); ++v) bone.values[v] = labels.values[v] == label;
-  const Volume from_bone_mm = DistanceMapMm(bone);
+  const Volume from_bone_mm = DistanceMapMm(MaskOfLabel(labels, label));
   double least_mm = within_mm;
   for (size_t v = 0; v < labels.values.size(); ++v)
     if (labels.values[v] == other) least_mm = std::min(least_mm, double(from_bone_mm.values[v]));

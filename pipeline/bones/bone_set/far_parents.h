@@ -1,4 +1,5 @@
-// Bones that a study's tree hangs on one that they do not meet.
+// Bones that lie far from their parent in the study's tree: the tree is not that of the joints, or an end
+// lacks.
 #pragma once
 #include <vector>
 

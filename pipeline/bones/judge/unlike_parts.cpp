@@ -9,6 +9,7 @@
 #include "core/bone_of_label.h"
 #include "core/host/parallel.h"
 #include "core/voxels/components.h"
+#include "core/voxels/label_mask.h"
 #include "core/voxels/voxel_box.h"
 #include "pipeline/bones/judge/doubt_bone.h"
 #include "pipeline/bones/refine/weighted_correlation.h"
@@ -49,10 +50,7 @@ std::vector<VoxelBox> BoxesOf(const BoneSet& bones) {
 
 // Within its box, the number of the connected piece of a bone at each of its voxels; -1 elsewhere.
 Image<int32_t> PiecesOf(const LabelMap& labels, int label, const VoxelBox& box) {
-  const LabelMap around = Cropped(labels, box);
-  Mask bone(around.grid);
-  for (size_t v = 0; v < bone.values.size(); ++v) bone.values[v] = around.values[v] == label;
-  return LabelComponents(bone).piece;
+  return LabelComponents(MaskOfLabel(Cropped(labels, box), label)).piece;
 }
 
 std::vector<Block> PartsOf(const BoneTissue& tissue, const Image<int32_t>& pieces, const CubicImage& scan,

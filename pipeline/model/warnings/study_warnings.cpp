@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "core/numbers/quantile.h"
 #include "core/region_presets.h"
@@ -175,11 +174,12 @@ std::vector<std::string> ParentWarnings(const BoneSet& bones, Region region) {
            std::to_string(std::lround(of.apart_mm)) + " mm away)";
   };
   std::vector<std::string> parted, far;
-  std::set<int> told;
-  for (const FarParent& of : PartedJoints(bones, surfaces, region))
-    parted.push_back(with_way(of)), told.insert(of.bone);
-  for (const FarParent& of : FarParents(bones, surfaces))
-    if (!told.contains(of.bone)) far.push_back(with_way(of));
+  const std::vector<FarParent> meant_to_meet = PartedJoints(bones, surfaces, region);
+  for (const FarParent& of : meant_to_meet) parted.push_back(with_way(of));
+  for (const FarParent& of : FarParents(bones, surfaces)) {
+    if (std::ranges::find(meant_to_meet, of.bone, &FarParent::bone) == meant_to_meet.end())
+      far.push_back(with_way(of));
+  }
   std::vector<std::string> warnings = Naming(
       "these bones lie farther from those that they meet than any joint is wide; does one of the two lack "
       "its "

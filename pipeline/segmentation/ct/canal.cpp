@@ -7,6 +7,7 @@
 
 #include "core/voxels/components.h"
 #include "core/voxels/dilated.h"
+#include "core/voxels/label_mask.h"
 #include "core/voxels/neighbours.h"
 #include "pipeline/scans/coarser.h"
 #include "pipeline/segmentation/ct/ct_outside.h"
@@ -42,11 +43,8 @@ struct Part {
 class SoftParts {
  public:
   SoftParts(const Volume& hu, const LabelMap& labels, const LabelMap& strokes, int label)
-      : hu_(hu), bone_(hu.grid), soft_(hu.grid) {
-    for (size_t v = 0; v < hu.values.size(); ++v) {
-      bone_.values[v] = labels.values[v] == label;
-      soft_.values[v] = hu.values[v] < kSoftHu;
-    }
+      : hu_(hu), bone_(MaskOfLabel(labels, label)), soft_(hu.grid) {
+    for (size_t v = 0; v < hu.values.size(); ++v) soft_.values[v] = hu.values[v] < kSoftHu;
     pieces_ = LabelComponents(WideParts());
     parts_.resize(pieces_.voxels.size());
     for (size_t v = 0; v < hu.values.size(); ++v)

@@ -7,6 +7,7 @@
 
 #include "core/voxels/components.h"
 #include "core/voxels/dilated.h"
+#include "core/voxels/label_mask.h"
 #include "pipeline/segmentation/mr/levels/marrow_level.h"
 #include "pipeline/segmentation/mr/search/clearest_bone.h"
 #include "pipeline/segmentation/mr/search/closed_blobs.h"
@@ -44,8 +45,7 @@ class Pieces {
     relative_ = Cropped(marked.scan, box_);
     for (float& r : relative_.values) r = float(r / marrow_level);
     labels_ = Cropped(found, box_), strokes_ = Cropped(marked.strokes, box_);
-    own_ = Mask(relative_.grid);
-    for (size_t v = 0; v < own_.values.size(); ++v) own_.values[v] = labels_.values[v] == bone.label;
+    own_ = MaskOfLabel(labels_, bone.label);
   }
 
   // Whether walls part its strokes.

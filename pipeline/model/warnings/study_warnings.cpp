@@ -182,8 +182,7 @@ std::vector<std::string> ParentWarnings(const BoneSet& bones, Region region) {
   }
   std::vector<std::string> warnings = Naming(
       "these bones lie farther from those that they meet than any joint is wide; does one of the two lack "
-      "its "
-      "end, as beyond a growth plate or a fracture where no stroke lies, or is a name wrong? ",
+      "its end, as beyond a growth plate or a fracture where no stroke lies, or is a name wrong? ",
       parted);
   std::ranges::move(
       Naming("these bones lie far from their parents, with other bones much nearer; a bone's parent is the "

@@ -173,14 +173,13 @@ TEST(MotionFile, KeyFramesAreReadAndCheckedByField) {
 
 TEST(MotionFile, WhatCannotBeReadSaysWhy) {
   const testing_support::ScratchFolder folder;
-  const std::filesystem::path file = folder.path() / "a.json";
+  const auto file = folder.path() / "a.json";
   EXPECT_THAT(Refusal([&] { ReadMotion(file, {}, {}); }), testing::HasSubstr("check that it exists"));
   std::filesystem::create_directory(file);
   EXPECT_THAT(Refusal([&] { ReadMotion(file, {}, {}); }), testing::HasSubstr("is a folder"));
-  std::filesystem::remove(file);
-  std::ofstream(file) << R"({"frames": [{"time": 0, "joints": {}}]})";
+  std::filesystem::remove(file), std::ofstream(file) << R"({"frames": [{"time": 0, "joints": {}}]})";
   std::filesystem::permissions(folder.path(), std::filesystem::perms::all);
-  EXPECT_EQ(ReadMotion(file, {}, {}).frames.size(), 1u);
+  ASSERT_EQ(ReadMotion(file, {}, {}).frames.size(), 1u);
   std::filesystem::permissions(file, std::filesystem::perms::none);
   const testing_support::AsNobody nobody;
   EXPECT_THROW(ReadMotion(file, {}, {}), Denied);

@@ -3,6 +3,6 @@
 
 namespace kvx {
 
-const char* ProgramVersion();  // "0.100.0"
+const char* ProgramVersion();  // "0.101.0"
 
 }  // namespace kvx

@@ -146,12 +146,41 @@ void CopyFolders(const fs::path& from, const fs::path& to, CopiedBefore before, 
   }
 }
 
-void RemoveWhatWent(const fs::path& data, const fs::path& backup) {
+// Of an older backup. Looked for before the records are copied, which so name nothing of it: what a subject
+// leaves that is removed later stays until the next backup.
+std::vector<fs::path> WhatWent(const fs::path& data, const fs::path& backup) {
+  std::vector<fs::path> went;
   for (const char* folder : kFolders) {
     for (const fs::path& file : AllBelow(backup, folder)) {
-      if (IsOurs(file) && (Passing(file) || !fs::exists(data / file))) fs::remove(backup / file);
+      if (IsOurs(file) && (Passing(file) || !fs::exists(data / file))) went.push_back(file);
     }
   }
+  return went;
+}
+
+// What has come again meanwhile stays.
+void Remove(const std::vector<fs::path>& went, const fs::path& data, const fs::path& backup) {
+  for (const fs::path& file : went) {
+    if (Passing(file) || !fs::exists(data / file)) fs::remove(backup / file);
+  }
+}
+
+// The audit trail only grows: a data folder without the end of the backup's trail is another one, or was put
+// back to an earlier state. A backup whose records cannot be read is made anew.
+bool IsOfAnother(const fs::path& data, const fs::path& backup) {
+  std::string head;
+  try {
+    const auto db = OpenForReading(backup / kDatabaseFile);
+    if (!db->tableExists("audit")) return false;
+    const auto text = [](SQLite::Statement& row) { return sqlite::Text(row, 0); };
+    head = sqlite::One(*db, "last_audit_hash", text).value_or("");
+  } catch (const SQLite::Exception&) {
+    return false;
+  }
+  const auto db = OpenForReading(data / kDatabaseFile);
+  if (head.empty() || !db->tableExists("audit")) return !head.empty();
+  return !sqlite::One(
+      *db, "audit_has_hash", [](SQLite::Statement&) { return true; }, head);
 }
 
 // Their bytes are in no copy. They name people, too: what is removed is overwritten.
@@ -162,10 +191,19 @@ void DropUnfinishedUploads(const fs::path& database) {
   sqlite::Execute(db, "remove_unfinished_resumables");
 }
 
+// Records of before have their requests elsewhere.
+void RequireOfThisKind(SQLite::Database& db) {
+  RequireKnown(db);
+  if (db.tableExists("job_request") || !db.tableExists("job")) return;
+  throw Conflict(
+      "this was written by an older version of kinevox; use that version, or let 'kinevox serve' of this one "
+      "open a copy of the folder once");
+}
+
 void CopyDatabase(const fs::path& from, const fs::path& to) {
   {
     const auto db = OpenForReading(from);
-    RequireKnown(*db);
+    RequireOfThisKind(*db);
     fs::remove(to);
     MakePrivateFile(to);  // SQLite copies into an empty file
     SQLite::Statement copy(*db, "VACUUM INTO ?1");
@@ -192,7 +230,7 @@ bool AllThere(const std::vector<fs::path>& blobs) {
 void RequireSound(const fs::path& backup, const Progress& progress) {
   if (!fs::exists(backup / kDatabaseFile)) throw NotFound("this folder is not a backup of a data folder");
   const auto db = OpenForReading(backup / kDatabaseFile);
-  RequireKnown(*db);
+  RequireOfThisKind(*db);
   const bool sound = db->execAndGet("PRAGMA integrity_check").getString() == "ok";
   const std::vector<fs::path> blobs = BlobsOf(backup / kDatabaseFile, backup);
   if (!sound || !AllThere(blobs)) throw InputError("the backup is damaged or not complete; use another one");
@@ -247,9 +285,12 @@ void RequireMayFill(const fs::path& folder) {
   if (!there) fs::remove(folder);
 }
 
+bool IsDamage(const SQLite::Exception& error) {
+  return error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB;
+}
+
 [[noreturn]] void ThrowFor(const SQLite::Exception& error) {
-  if (error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB)
-    throw InputError("the database is damaged; restore the data folder from a backup");
+  if (IsDamage(error)) throw InputError("the database is damaged; restore the data folder from a backup");
   throw Unavailable(
       "the database cannot be copied now; is the disk full, or may this user not write to its folder?");
 }
@@ -262,11 +303,17 @@ BackupFigures BackUp(const fs::path& data, const fs::path& backup, CopiedBefore 
     throw NotFound("this is not a data folder of the service; give it with --data");
   RequireApart(data, backup);
   RequireForBackups(backup);
+  if (IsOfAnother(data, backup))
+    throw InputError(
+        "the older backup is of another data folder, or of a later state of this one; is the data folder's "
+        "disk mounted? Else give a new folder to copy into");
   MakePrivateFolder(backup);
   MakePrivateFile(backup / kMark);
   const fs::path records = backup / kDatabaseFile, newer = records.string() + kCopying;
   BackupFigures figures;
+  std::vector<fs::path> went;
   for (int tries = 1;; ++tries) {
+    went = WhatWent(data, backup);
     CopyDatabase(data / kDatabaseFile, newer);
     CopyFolders(data, backup, before, figures, progress);
     if (AllThere(BlobsOf(newer, backup)))
@@ -274,7 +321,7 @@ BackupFigures BackUp(const fs::path& data, const fs::path& backup, CopiedBefore 
     if (tries == kTries) throw Unavailable("records and files do not agree; try again when less is removed");
   }
   fs::rename(newer, records);
-  RemoveWhatWent(data, backup);
+  Remove(went, data, backup);
   return figures;
 } catch (const fs::filesystem_error& error) {
   ThrowNotWritten("the backup", error.code());
@@ -305,8 +352,9 @@ BackupFigures Restore(const fs::path& backup, const fs::path& data, const Progre
   return figures;
 } catch (const fs::filesystem_error& error) {
   ThrowNotWritten("the data folder", error.code());
-} catch (const SQLite::Exception&) {
-  throw InputError("the backup's database is damaged; use another backup");
+} catch (const SQLite::Exception& error) {
+  if (IsDamage(error)) throw InputError("the backup's database is damaged; use another backup");
+  throw Unavailable("the database cannot be copied; is the disk full, or may this user not read the backup?");
 }
 
 }  // namespace kvx

@@ -58,21 +58,31 @@ void Retention::EmptyLog() {
   if (log_holds_removed_.exchange(false) && !db_.EmptyLog()) log_holds_removed_ = true;
 }
 
+void Retention::RemoveBytesOf(const std::string& kind, const std::string& name,
+                              const RemoveModel& remove_model) {
+  if (kind == "model") remove_model(name);
+  if (kind == "resumable") RemoveFile(uploads_ / name);
+  const auto kept = blobs_.KeepOthersOut();  // nobody takes up the same bytes meanwhile
+  db_.Write([&](SQLite::Database& db) {
+    if (kind == "blob" && CountOf(db, "count_blob_uses", name) == 0) blobs_.Remove(name);
+    sqlite::Execute(db, "forget_removal", kind, name);
+  });
+}
+
 void Retention::RemoveBytes(const RemoveModel& remove_model) {
   const auto removals =
       db_.Read([](SQLite::Database& db) { return sqlite::All(db, "list_removals", RemovalRow); });
+  std::exception_ptr failed;
   for (const Removal& removal : removals) {
-    if (removal.kind == "model") remove_model(removal.name);
-    if (removal.kind == "resumable") RemoveFile(uploads_ / removal.name);
-    const auto kept = blobs_.KeepOthersOut();  // nobody takes up the same bytes meanwhile
-    db_.Write([&](SQLite::Database& db) {
-      if (removal.kind == "blob" && CountOf(db, "count_blob_uses", removal.name) == 0)
-        blobs_.Remove(removal.name);
-      sqlite::Execute(db, "forget_removal", removal.kind, removal.name);
-    });
+    try {
+      RemoveBytesOf(removal.kind, removal.name, remove_model);
+    } catch (...) {  // it keeps none of the others
+      failed = std::current_exception();
+    }
   }
   if (!removals.empty()) log_holds_removed_ = true;  // after a crash
   EmptyLog();
+  if (failed) std::rethrow_exception(failed);
 }
 
 void Retention::DropUnrecorded(const std::string& blob) noexcept try {

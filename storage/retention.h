@@ -26,7 +26,7 @@ class Retention {
   // somebody was reading, it is tried again at the next call.
   void EmptyLog();
 
-  // Its files; throws to be asked again later
+  // Its files; throws to be asked again later. What fails is left for the next call, when all else is gone.
   using RemoveModel = std::function<void(const std::string& model)>;
   void RemoveBytes(const RemoveModel& remove_model);
 
@@ -34,6 +34,8 @@ class Retention {
   void DropUnrecorded(const std::string& blob) noexcept;
 
  private:
+  void RemoveBytesOf(const std::string& kind, const std::string& name, const RemoveModel& remove_model);
+
   Database& db_;
   BlobStore& blobs_;
   AuditTrail& audit_;

@@ -193,6 +193,9 @@ MadeBones MakeBones(Services& services, const std::string& stored_request, const
   auto kept = std::make_shared<std::shared_lock<std::shared_mutex>>(services.blobs.KeepRemovalOut());
   file.content = services.blobs.Keep(std::move(blob));
   return {Dump(result), [&services, subject, template_scan, id, file, kept] {
+            // A service beside this process may have removed another subject that had the same bytes
+            if (!std::filesystem::exists(services.blobs.PathOf(file.content)))
+              throw Unavailable("the bones were removed with another subject; they are made again");
             services.catalogue.AddBones(subject, template_scan, file, id);
           }};
 }

@@ -216,6 +216,7 @@ ResumableUpload ResumablePart::Finish() {
 }
 
 void ResumablePart::StoreWhole() {
+  services_.catalogue.RequireSubject(writer_->upload().subject);  // removed, its bytes are gone, too
   const std::string filename =
       QueryValue(QueryFrom(writer_->upload().parameters), "filename", kBonesFilename);
   IncomingBlob blob = services_.blobs.Adopt(writer_->path(), RequireUploadFormat(filename).suffix);

@@ -66,6 +66,39 @@ class Backup : public testing::Test {
   fs::path upload;
 };
 
+// The records that were copied name its upload still: what they name stays until the next backup.
+TEST_F(Backup, ASubjectThatIsRemovedMeanwhileDoesNotSpoilIt) {
+  BackUp(data(), copy());
+  bool removed = false;
+  const auto remove_once = [&](std::string_view, double) {
+    if (!std::exchange(removed, true)) RemoveSubject();
+  };
+  BackUp(data(), copy(), CopiedBefore::kTrusted, Progress(remove_once, {}));
+  ASSERT_TRUE(removed);
+  EXPECT_TRUE(fs::exists(copy() / upload));
+  const fs::path restored = scratch.path() / "restored";
+  Restore(copy(), restored);
+  EXPECT_EQ(Content(restored / upload), "VOXELS");
+  BackUp(data(), copy());
+  EXPECT_FALSE(fs::exists(copy() / upload));
+}
+
+// As where the data folder's disk was not mounted, and a service made a new one in its place.
+TEST_F(Backup, AnEmptyDataFolderDoesNotReplaceAnother) {
+  {
+    Stores stores(data(), {});
+    const std::string other = stores.catalogue.AddSubject({"John Doe", "knee", {}}).id;
+    stores.retention.DeleteSubject(other, "-", "default");  // the trail has an entry
+  }
+  BackUp(data(), copy());
+  const fs::path empty = scratch.path() / "empty";
+  { const Stores stores(empty, {}); }
+  EXPECT_THROW(BackUp(empty, copy()), InputError);
+  EXPECT_TRUE(fs::exists(copy() / upload));
+  RemoveSubject();
+  EXPECT_NO_THROW(BackUp(data(), copy())) << "its own trail has grown";
+}
+
 TEST_F(Backup, FoldersOfOtherThingsStayAsTheyAre) {
   const fs::path thesis = copy() / "models" / "knee-a" / "thesis.txt";
   Write(thesis, "thesis");

@@ -40,7 +40,7 @@ void AddBackup(CLI::App& program, CommandContext& context) {
   AddData(*backup, arguments->data);
   backup
       ->add_option("--out", arguments->other,
-                   "Folder of the copy: new, empty, or an older copy, which is brought up to date")
+                   "Folder of the copy: new, empty, or an older copy of it, which is brought up to date")
       ->required()
       ->type_name("DIR");
   backup->add_flag("--check", arguments->check,

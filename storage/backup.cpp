@@ -146,13 +146,15 @@ void CopyFolders(const fs::path& from, const fs::path& to, CopiedBefore before, 
   }
 }
 
+bool HasGone(const fs::path& file, const fs::path& data) { return Passing(file) || !fs::exists(data / file); }
+
 // Of an older backup. Looked for before the records are copied, which so name nothing of it: what a subject
 // leaves that is removed later stays until the next backup.
 std::vector<fs::path> WhatWent(const fs::path& data, const fs::path& backup) {
   std::vector<fs::path> went;
   for (const char* folder : kFolders) {
     for (const fs::path& file : AllBelow(backup, folder)) {
-      if (IsOurs(file) && (Passing(file) || !fs::exists(data / file))) went.push_back(file);
+      if (IsOurs(file) && HasGone(file, data)) went.push_back(file);
     }
   }
   return went;
@@ -161,26 +163,28 @@ std::vector<fs::path> WhatWent(const fs::path& data, const fs::path& backup) {
 // What has come again meanwhile stays.
 void Remove(const std::vector<fs::path>& went, const fs::path& data, const fs::path& backup) {
   for (const fs::path& file : went) {
-    if (Passing(file) || !fs::exists(data / file)) fs::remove(backup / file);
+    if (HasGone(file, data)) fs::remove(backup / file);
   }
 }
 
-// The audit trail only grows: a data folder without the end of the backup's trail is another one, or was put
-// back to an earlier state. A backup whose records cannot be read is made anew.
+std::string TextRow(SQLite::Statement& row) { return sqlite::Text(row, 0); }
+
+// Hash of the audit trail's last entry; nothing without one, and of records that cannot be read.
+std::optional<std::string> EndOfTrail(const fs::path& records) try {
+  const auto db = OpenForReading(records);
+  if (!db->tableExists("audit")) return std::nullopt;
+  return sqlite::One(*db, "last_audit_hash", TextRow);
+} catch (const SQLite::Exception&) {
+  return std::nullopt;
+}
+
+// The trail only grows: a data folder without the end of the backup's is another one, or was put back to an
+// earlier state.
 bool IsOfAnother(const fs::path& data, const fs::path& backup) {
-  std::string head;
-  try {
-    const auto db = OpenForReading(backup / kDatabaseFile);
-    if (!db->tableExists("audit")) return false;
-    const auto text = [](SQLite::Statement& row) { return sqlite::Text(row, 0); };
-    head = sqlite::One(*db, "last_audit_hash", text).value_or("");
-  } catch (const SQLite::Exception&) {
-    return false;
-  }
+  const std::optional<std::string> end = EndOfTrail(backup / kDatabaseFile);
+  if (!end) return false;
   const auto db = OpenForReading(data / kDatabaseFile);
-  if (head.empty() || !db->tableExists("audit")) return !head.empty();
-  return !sqlite::One(
-      *db, "audit_has_hash", [](SQLite::Statement&) { return true; }, head);
+  return !db->tableExists("audit") || !sqlite::One(*db, "audit_has_hash", TextRow, *end);
 }
 
 // Their bytes are in no copy. They name people, too: what is removed is overwritten.

@@ -1,6 +1,8 @@
 // The order: records and the list of what to remove (committed), bytes, the list's lines.
 #include "storage/retention.h"
 
+#include <exception>
+
 #include "core/errors.h"
 #include "storage/database/sqlite.h"
 

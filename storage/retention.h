@@ -26,8 +26,10 @@ class Retention {
   // somebody was reading, it is tried again at the next call.
   void EmptyLog();
 
-  // Its files; throws to be asked again later. What fails is left for the next call, when all else is gone.
+  // Its files; throws to be asked again later
   using RemoveModel = std::function<void(const std::string& model)>;
+  // Of all removed subjects. What cannot be removed stays for the next call, and is thrown when all else
+  // went.
   void RemoveBytes(const RemoveModel& remove_model);
 
   // Bytes that were placed for a record that was refused then; they stay where another record names them.

@@ -3,6 +3,7 @@
 #include "api/handlers/bones.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
 

@@ -1,1 +1,1 @@
-SELECT 1 FROM audit WHERE hash = :hash
+SELECT hash FROM audit WHERE hash = :hash

@@ -119,6 +119,17 @@ TEST(Resumable, ARefusedWholeLeavesNothing) {
   EXPECT_EQ(w.FilesUnder("uploads") + w.FilesUnder("incoming") + w.FilesUnder("blobs"), 0u);
 }
 
+// Its subject's removal takes the bytes that came, too.
+TEST(Resumable, WhoseSubjectIsRemovedWhileItIsSentFindsNone) {
+  TusWorld w;
+  const std::string id = w.Create(6);
+  ResumablePart part(w.services, id, "0", "");
+  part.Write(std::string_view("VOXELS"));
+  DeleteSubject(w.services, w.subject, "key_a", "default");
+  EXPECT_THROW(part.Finish(), NotFound);
+  EXPECT_EQ(w.FilesUnder("blobs") + w.FilesUnder("incoming") + w.FilesUnder("uploads"), 0u);
+}
+
 TEST(Resumable, IsRefusedBeforeTheFirstByteWhereItCanBe) {
   TusWorld w;
   w.Send(w.Create(7), 0, "VOXELS1");

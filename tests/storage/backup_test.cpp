@@ -4,18 +4,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <linux/capability.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-
 #include <fstream>
-#include <thread>
+#include <utility>
 
 #include "core/errors.h"
 #include "storage/database/sqlite.h"
 #include "storage/stores.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/refusal.h"
+#include "tests/support/without_root_powers.h"
 
 namespace kvx {
 namespace {
@@ -28,17 +25,10 @@ void Write(const fs::path& file, const std::string& text) {
   std::ofstream(file) << text;
 }
 
-// What the denial says; root may read and write everything, unless a thread gives that up.
+// What the denial says.
 std::string Denial(const std::function<void()>& act) {
   std::string told;
-  std::thread([&] {
-    __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
-    __user_cap_data_struct powers[2] = {};
-    ::syscall(SYS_capget, &header, powers);
-    powers[0].effective &= ~(1u << CAP_DAC_OVERRIDE | 1u << CAP_DAC_READ_SEARCH);
-    ::syscall(SYS_capset, &header, powers);
-    told = testing_support::RefusalOf<Denied>(act, "none");
-  }).join();
+  testing_support::WithoutRootPowers([&] { told = testing_support::RefusalOf<Denied>(act, "none"); });
   return told;
 }
 

@@ -1,16 +1,14 @@
 // Files that the user names: missing ones are exit code 5, damaged ones 3, and the message says which.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <linux/capability.h>
-#include <sys/prctl.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "tests/support/dicom_segmentation.h"
 #include "tests/support/hinge_study.h"
 #include "tests/support/program_test.h"
+#include "tests/support/without_root_powers.h"
 
 namespace kvx {
 namespace {
@@ -109,7 +107,6 @@ TEST_F(NamedFiles, AnOutputTakesNoPlaceOfWhatItIsMadeFrom) {
   EXPECT_EQ(testing_support::Content(scan) + testing_support::Content(strokes), "niinii");
 }
 
-// Root may read and write everything, unless it gives that up: a thread and what it starts can.
 TEST_F(NamedFiles, WhatThePersonMayNotDoIsRefused) {
   const std::string closed = At("closed"), hidden = Put("hidden.json", "{}"), scan = Put("hidden.nii", "nii"),
                     model = At("m");
@@ -127,11 +124,7 @@ TEST_F(NamedFiles, WhatThePersonMayNotDoIsRefused) {
       {"info", model}};
   for (const auto& command : commands) {
     Ended ended;
-    std::thread([&] {
-      for (const int power : {CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH})
-        ::prctl(PR_CAPBSET_DROP, power, 0, 0, 0);
-      ended = Run(command);
-    }).join();
+    testing_support::WithoutRootPowers([&] { ended = Run(command); });
     EXPECT_EQ(ended.code, kRefused) << command.front() << ": " << ended.err;
     EXPECT_THAT(ended.err, testing::ContainsRegex("may not be (read|written|created)")) << command.front();
   }

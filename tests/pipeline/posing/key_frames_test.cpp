@@ -9,9 +9,9 @@
 #include "core/errors.h"
 #include "pipeline/model/files/motion_file.h"
 #include "pipeline/posing/pose_plan.h"
-#include "tests/support/as_nobody.h"
 #include "tests/support/fixtures.h"
 #include "tests/support/refusal.h"
+#include "tests/support/without_root_powers.h"
 
 namespace kvx {
 namespace {
@@ -177,12 +177,11 @@ TEST(MotionFile, WhatCannotBeReadSaysWhy) {
   EXPECT_THAT(Refusal([&] { ReadMotion(file, {}, {}); }), testing::HasSubstr("check that it exists"));
   std::filesystem::create_directory(file);
   EXPECT_THAT(Refusal([&] { ReadMotion(file, {}, {}); }), testing::HasSubstr("is a folder"));
-  std::filesystem::remove(file), std::ofstream(file) << R"({"frames": [{"time": 0, "joints": {}}]})";
-  std::filesystem::permissions(folder.path(), std::filesystem::perms::all);
+  std::filesystem::remove(file);
+  std::ofstream(file) << R"({"frames": [{"time": 0, "joints": {}}]})";
   ASSERT_EQ(ReadMotion(file, {}, {}).frames.size(), 1u);
   std::filesystem::permissions(file, std::filesystem::perms::none);
-  const testing_support::AsNobody nobody;
-  EXPECT_THROW(ReadMotion(file, {}, {}), Denied);
+  testing_support::WithoutRootPowers([&] { EXPECT_THROW(ReadMotion(file, {}, {}), Denied); });
 }
 
 TEST(MotionFile, FieldsThatNobodyReadsAreRefusedByName) {

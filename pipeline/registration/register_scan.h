@@ -24,7 +24,7 @@ enum class RegistrationMethod { kAdaptive, kPaper };
 
 struct RegisterScan {
   static constexpr std::string_view kName = "register";
-  static constexpr int kVersion = 43;
+  static constexpr int kVersion = 44;
   using Inputs = RegistrationInputs;
   struct Options {
     RegistrationMethod method = RegistrationMethod::kAdaptive;

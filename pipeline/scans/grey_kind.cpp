@@ -24,7 +24,13 @@ bool IsFilling(const std::vector<float>& air, const std::vector<float>& others) 
   return least == most && std::set(others.begin(), others.end()).size() > kGreysOfScans;
 }
 
+// Nothing is as light.
+bool LiesBelowHounsfield(std::vector<float> sample) {
+  return TakeQuantile(sample, 1 - kStrayShare) <= kLeastHu;
+}
+
 bool ShowsAirOfCt(std::vector<float> sample) {
+  if (LiesBelowHounsfield(sample)) return false;
   if (TakeQuantile(sample, kCtAirShare) >= kCtAirHu) return false;
   const auto fat = std::ranges::count_if(sample, [](float v) { return v >= kCtAirHu && v < kFatHu; });
   const auto others = std::partition(sample.begin(), sample.end(), [](float v) { return v < kCtAirHu; });
@@ -60,7 +66,7 @@ bool IsHounsfield(const std::vector<float>& greys, const std::string& modality) 
 
 bool ContradictsCt(const Volume& volume) {
   std::vector<float> sample = SampleOf<float>(volume.values);
-  return TakeQuantile(sample, kFatShare) >= kFatHu;
+  return LiesBelowHounsfield(sample) || TakeQuantile(sample, kFatShare) >= kFatHu;
 }
 
 double ZeroLevelOf(std::vector<float> greys) { return Greys(std::move(greys)).zero; }

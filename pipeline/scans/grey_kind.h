@@ -13,12 +13,13 @@ constexpr double kCtAirHu = -500;  // CT: half way between air and water; a dark
 // Hounsfield units: by the file's word, or where it has none by what every CT shows: a hundredth of the
 // voxels below -500 (air), tissue no denser than bone. A few voxels of air prove nothing: resampling by
 // splines undershoots. Nor do many of one value where hardly a voxel is between that and -50 (fat, skin):
-// tools fill corners.
+// tools fill corners. Nothing is lighter than air: greys all below -1024 are no Hounsfield units.
 bool IsHounsfield(const Volume& volume, const std::string& modality);
 bool IsHounsfield(const std::vector<float>& greys, const std::string& modality);  // of a sample of them
 
 // Whether greys of which a file says CT are no Hounsfield units: hardly one is as light as fat, which is in
-// every body. So it is where the rescale slope and intercept were lost on the way.
+// every body, or hardly one as dense as air. So it is where the rescale slope and intercept were lost on the
+// way.
 bool ContradictsCt(const Volume& volume);
 
 // What no signal reads as. 0 but for images that a tool has shifted: all of their greys lie far above 0

@@ -24,7 +24,7 @@ Digest LabelsDigest(const std::filesystem::path& labels, const std::vector<Study
 // ReadScanEvenly. Throws InputError for a scan that is even everywhere, too.
 struct LoadScan {
   static constexpr std::string_view kName = "load";
-  static constexpr int kVersion = 6;
+  static constexpr int kVersion = 7;
   struct Inputs {
     Digest content;              // ContentDigest(path)
     std::filesystem::path path;  // where the bytes lie today; not part of the key

@@ -187,6 +187,50 @@ def moved_halfway(study):
     study.change_scans(change)
 
 
+def read_as_unsigned(values, affine):
+    return np.round(2 * values + 2.0 ** 15).astype(np.uint16), affine
+
+
+@variant
+def signed_read_as_unsigned(study):
+    """Air at 32768."""
+    study.change_all(read_as_unsigned)
+
+
+@variant
+def scans_signed_read_as_unsigned(study):
+    study.change_scans(read_as_unsigned)
+
+
+@variant
+def scans_standardised(study):
+    """Mean 0, spread 1, each by itself."""
+    study.change_scans(lambda values, affine: (((values - values.mean()) / values.std()).astype(np.float32), affine))
+
+
+@variant
+def scans_brighter(study):
+    """By 100, air and all."""
+    study.change_scans(lambda values, affine: (values + 100.0, affine))
+
+
+@variant
+def scans_brighter_in_the_shadow_of_a_coil(study):
+    study.change_scans(
+        lambda values, affine: (values * np.geomspace(1.5, 0.67, values.shape[0])[:, None, None] + 100.0, affine))
+
+
+@variant
+def scans_clipped(study):
+    """What is darker than muscle is as dark as that, and reads 0: a display's window."""
+    study.change_scans(lambda values, affine: (np.clip(values, 60, 200) - 60, affine))
+
+
+@variant
+def scans_clipped_far_from_zero(study):
+    study.change_scans(lambda values, affine: (np.clip(values, 40, 200), affine))
+
+
 @variant
 def saturated(study):
     """Whatever is brighter than half of the body has one value."""

@@ -8,6 +8,7 @@
 #include "core/voxels/distance_transform.h"
 #include "core/voxels/finer_grid.h"
 #include "pipeline/registration/images/closed_air.h"
+#include "pipeline/registration/images/grey_origin.h"
 #include "pipeline/registration/images/match_greys.h"
 #include "pipeline/registration/images/noise.h"
 #include "pipeline/registration/images/start_residual.h"
@@ -134,22 +135,26 @@ LevelImages PrepareImages(const RegistrationInputs& inputs, const Eigen::Vector3
   // Between the planes of a filled side that was split there is none of one value.
   const OwnOrLent<Volume> as_measured = EveryVoxelOf(template_scan.volume, times);
   const VoxelBox box = MeasuredBoxOf(*as_measured);
+  const OwnOrLent<Volume> of_template = Within(*as_measured, box);
   LevelImages out{.beyond_coat_mm = beyond_coat_mm,
                   .template_box = {box.low.cwiseProduct(times), (box.high.array() - 1) * times.array() + 1},
-                  .template_corners = FilledCorners(*Within(*as_measured, box), template_scan.modality),
+                  .template_corners = FilledCorners(*of_template, template_scan.modality),
                   .times = times};
+  out.template_origin = GreyOriginOf(*of_template, out.template_corners, template_scan.modality);
   out.body = Crop(*inputs.body, region);
   out.body_distance_mm = DistanceMapMm(out.body);
   const OwnOrLent<Volume> measured = Measured(inputs.scan->volume);
   out.scan_grid = measured->grid;
   out.scan_corners = FilledCorners(*measured, inputs.scan->modality);
   const double spacing_mm = out.body.grid.MeanSpacingMm();
-  out.measured_scan = AsCoarseAs(*measured, spacing_mm);
+  const float scan_origin = GreyOriginOf(*measured, out.scan_corners, inputs.scan->modality);
+  out.measured_scan = FromOrigin(AsCoarseAs(*measured, spacing_mm), scan_origin);
   out.sharing = 0.5 * (VoxelsSharingNoise(*as_measured) + VoxelsSharingNoise(out.measured_scan));
   const Eigen::Vector3i scan_times = TimesFiner(out.measured_scan.grid, spacing_mm);
   const Smoothing smoothing = SmoothingOf(times, scan_times);
-  out.template_volume =
-      SmoothedWithin(template_scan.volume, out.template_box, smoothing.of_template, region, pyramid);
+  out.template_volume = FromOrigin(
+      SmoothedWithin(template_scan.volume, out.template_box, smoothing.of_template, region, pyramid),
+      out.template_origin);
   const double refined_voxels = double(out.measured_scan.values.size()) * double(scan_times.prod());
   const bool whole = (scan_times.array() == 1).all() || refined_voxels <= kMostRefinedVoxels;
   const OwnOrLent<Volume> seen = whole

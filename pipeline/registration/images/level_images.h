@@ -19,11 +19,12 @@ struct LevelImages {
   Mask template_corners, scan_corners;  // filled up; on the images' own grids, or empty
   Mask body;
   Volume body_distance_mm;
-  Volume template_volume, scan;  // smoothed
+  float template_origin = 0;     // of the greys as they came
+  Volume template_volume, scan;  // smoothed, from their origins
   Grid scan_grid;                // of the scan as it came, without sides that were filled up
-  Volume measured_scan;          // what was measured of it, on voxels no finer than the template's
-  Eigen::Vector3i times;         // voxels of the template in the place of one that was measured
-  double sharing = 1;            // measured voxels that share their noise, mean of the two
+  Volume measured_scan;   // what was measured of it, also from there, on voxels no finer than the template's
+  Eigen::Vector3i times;  // voxels of the template in the place of one that was measured
+  double sharing = 1;     // measured voxels that share their noise, mean of the two
 };
 // `beyond_coat_mm`: as BeyondBoneCoatMm gives it; referred to.
 LevelImages PrepareImages(const RegistrationInputs& inputs, const Eigen::Vector3i& times,

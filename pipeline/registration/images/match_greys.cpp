@@ -9,6 +9,7 @@
 
 #include "core/host/parallel.h"
 #include "core/voxels/finer_grid.h"
+#include "pipeline/registration/images/grey_origin.h"
 #include "pipeline/registration/images/grey_table.h"
 #include "pipeline/registration/images/noise.h"
 #include "pipeline/registration/images/shading.h"
@@ -33,6 +34,8 @@ size_t StrideOf(const Grid& grid, size_t enough, size_t least = 1) {
   return stride;
 }
 
+constexpr double kRounding = 1e-12;  // of a mean square, in sums
+
 struct Statistics {
   double mean = 0, spread = 1;
 };
@@ -51,8 +54,8 @@ Statistics StatisticsOf(size_t count, Value value) {  // value(v) -> optional<do
     if (const std::optional<double> x = value(v)) so_far += {1, *x, *x * *x};
   });
   if (sum.count < 1) return {};
-  const double mean = sum.values / sum.count;
-  return {mean, std::sqrt(std::max(1e-12, sum.squares / sum.count - mean * mean))};
+  const double mean = sum.values / sum.count, square = sum.squares / sum.count;
+  return {mean, square > 0 ? std::sqrt(std::max(kRounding * square, square - mean * mean)) : 1};
 }
 
 // What the scan shows where the start puts the voxels that count; nothing elsewhere.
@@ -188,7 +191,8 @@ void MatchGreys(const RegistrationInputs& inputs, const LevelImages& images, Sho
   const Statistics s = StatisticsOf(n, shown_at);
   const double gain = t.spread / s.spread;
   const Volume& given = inputs.template_scan->volume;
-  const OwnOrLent<Volume> whole = pair.contrast ? OwnOrLent(Mapped(given, pair.contrast)) : given;
+  const OwnOrLent<Volume> whole =
+      pair.contrast ? OwnOrLent(Mapped(FromOrigin(given, images.template_origin), pair.contrast)) : given;
   double noise = std::hypot(template_noise * NoiseSigma(*EveryVoxelOf(*whole, images.times),
                                                         *EveryVoxelOf(*inputs.body, images.times)),
                             scan_noise * gain * NoiseSigma(pair.raw));

@@ -40,16 +40,46 @@ TEST(RegisterScan, ToleratesAnotherGainAndBias) {
   EXPECT_LT(Compare(result, Bump, kSpacing).mean_mm, 0.25 * kSpacing);
 }
 
+// Maps of quantities in SI units come in such numbers. In greys as those of CT no shading brings both scans
+// to the same size.
+TEST(RegisterScan, ToleratesGreysOfAnySize) {
+  Scan given = Render(LimbGrid(), Identity, 1, 1, -500),
+       scan = Render(LimbGrid(), TemplateFromBumped, 2, 1, -500);
+  given.modality = scan.modality = "CT";
+  const RegisteredScan as_given = Register(given, scan);
+  for (const double gain : {1e-9, 1e9}) {
+    Scan scaled = given;
+    for (float& value : scaled.volume.values) value *= float(gain);
+    const RegisteredScan result = Register(scaled, scan);
+    EXPECT_NEAR(Compare(result, Bump, kSpacing).mean_mm, Compare(as_given, Bump, kSpacing).mean_mm, 1e-3);
+    EXPECT_NEAR(result.confidence.mean_percent, as_given.confidence.mean_percent, 0.1) << gain;
+  }
+}
+
 // A coil beside the limb: four times as bright on one side of it as on the other.
-TEST(RegisterScan, TissueInTheShadowOfACoilIsFoundAsWell) {
+Scan BumpedInTheShadowOfACoil() {
   Scan scan = Render(LimbGrid(), TemplateFromBumped, 2);
   const double width = kSpacing * (scan.volume.grid.size.x() - 1);
   for (size_t v = 0; v < scan.volume.values.size(); ++v) {
     const double x = kSpacing * scan.volume.grid.Ijk(v).x() / width;
     scan.volume.values[v] *= float(2 * std::pow(4.0, -x));
   }
-  const RegisteredScan result = Register(Render(LimbGrid(), Identity, 1), scan);
+  return scan;
+}
+
+TEST(RegisterScan, TissueInTheShadowOfACoilIsFoundAsWell) {
+  const RegisteredScan result = Register(Render(LimbGrid(), Identity, 1), BumpedInTheShadowOfACoil());
   EXPECT_LT(Compare(result, Bump, kSpacing).mean_mm, 0.27 * kSpacing);
+}
+
+// Ratios of shifted greys say nothing of the coil.
+TEST(RegisterScan, TissueInTheShadowOfACoilIsFoundInGreysThatAToolHasShifted) {
+  for (const float shift : {-60.0f, 100.0f, 32768.0f}) {
+    Scan scan = BumpedInTheShadowOfACoil();
+    for (float& value : scan.volume.values) value += shift;
+    const RegisteredScan result = Register(Render(LimbGrid(), Identity, 1), scan);
+    EXPECT_LT(Compare(result, Bump, kSpacing).mean_mm, 0.27 * kSpacing) << "shifted by " << shift;
+  }
 }
 
 // Dark tissue bright and bright bone dark, air as before: no gain and bias can say that.

@@ -33,6 +33,11 @@ TEST(IsHounsfield, AFillingBesideTissueWithoutFatIsNoAir) {
 
 TEST(IsHounsfield, TissueIsNoDenserThanBone) { EXPECT_FALSE(IsHounsfield(Mr(100, -3000), "")); }
 
+TEST(IsHounsfield, NothingIsLighterThanAir) {
+  EXPECT_FALSE(IsHounsfield(Mr(2, -32768), ""));
+  EXPECT_TRUE(ContradictsCt(Mr(2, -32768)));
+}
+
 // As CT is stored: 1024 is added to Hounsfield units, and a rescale takes it off again.
 TEST(ContradictsCt, IsSaidOfGreysWithoutAVoxelOfFat) {
   Volume ct(ObliqueGrid({20, 20, 20}), 40.0f);

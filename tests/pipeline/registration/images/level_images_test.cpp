@@ -18,7 +18,7 @@ using namespace testing_support;
 // Of one grey each but for noughts that a program added to the template at its ends.
 Volume TemplateAsCompared(int filled_planes) {
   const Grid grid = ObliqueGrid({16, 12, 20});
-  Scan shown{Volume(grid, 100.0f)};
+  Scan shown{.volume = Volume(grid, 100.0f), .modality = "CT"};  // of MR it would be taken for the origin
   for (size_t v = 0; v < shown.volume.values.size(); ++v) {
     const Eigen::Vector3i p = grid.Ijk(v);
     shown.volume.values[v] += float(p.x() + p.y());

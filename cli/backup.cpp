@@ -7,6 +7,8 @@
 #include "cli/commands.h"
 #include "cli/terminal/interrupt.h"
 #include "cli/terminal/progress_bar.h"
+#include "core/errors.h"
+#include "core/text/listed.h"
 #include "storage/backup.h"
 
 namespace kvx {
@@ -14,27 +16,28 @@ namespace {
 
 struct BackupArguments {
   std::filesystem::path data, other;
-  bool check = false;
+  bool check = false, incomplete = false;
 };
 
 void Print(const BackupFigures& figures, const CommandContext& context) {
-  if (context.json) return PrintDocument(Dump(Json{{"files", figures.files}, {"bytes", figures.bytes}}));
+  if (context.json)
+    return PrintDocument(
+        Dump(Json{{"files", figures.files}, {"bytes", figures.bytes}, {"lost", figures.lost}}));
   std::printf("%lld files copied, %.1f MiB\n", static_cast<long long>(figures.files),
               double(figures.bytes) / (1 << 20));
 }
 
 template <class Copy>
-void Run(const Copy& copy, const CommandContext& context) {
+BackupFigures Run(const Copy& copy, const CommandContext& context) {
   CatchInterrupts();
   ProgressBar bar(context.quiet);
   const BackupFigures figures = copy(bar.AsProgress());
   bar.Finish();
   Print(figures, context);
+  return figures;
 }
 
-}  // namespace
-
-void AddBackup(CLI::App& program, CommandContext& context) {
+void AddBackupAlone(CLI::App& program, CommandContext& context) {
   auto arguments = std::make_shared<BackupArguments>();
   CLI::App* backup = program.add_subcommand("backup", "Copy a data folder while the service runs");
   AddData(*backup, arguments->data);
@@ -50,11 +53,21 @@ void AddBackup(CLI::App& program, CommandContext& context) {
     const auto back_up = [&](const Progress& p) {
       return BackUp(arguments->data, arguments->other, before, p);
     };
-    Run(back_up, context);
+    const BackupFigures figures = Run(back_up, context);
+    if (figures.lost.empty()) return;
+    throw Unavailable(
+        "the copy is made, without what is lost or damaged in the data folder: " + Listed(figures.lost) +
+        "; upload or build them again and repeat this, or see whether an older backup has them");
   });
   backup->footer(
       "Posed volumes and unfinished uploads are left out.\n\n"
       "Example:\n  kinevox backup --data /srv/kinevox --out /backup/kinevox");
+  AddQuiet(*backup, context);
+  AddJson(*backup, context);
+}
+
+void AddRestore(CLI::App& program, CommandContext& context) {
+  auto arguments = std::make_shared<BackupArguments>();
   CLI::App* restore = program.add_subcommand("restore", "Check a backup and make a data folder of it");
   restore->add_option("--from", arguments->other, "Folder that 'kinevox backup' made")
       ->required()
@@ -62,14 +75,28 @@ void AddBackup(CLI::App& program, CommandContext& context) {
   restore->add_option("--data", arguments->data, "The data folder to make; empty or not there")
       ->capture_default_str()
       ->type_name("DIR");
+  restore->add_flag(
+      "--incomplete", arguments->incomplete,
+      "Restore the rest where uploads or models are lost or damaged in the backup; they are named");
   restore->callback([arguments, &context] {
-    Run([&](const Progress& p) { return Restore(arguments->other, arguments->data, p); }, context);
+    const Lost lost = arguments->incomplete ? Lost::kLeftOut : Lost::kRefused;
+    const auto restore_it = [&](const Progress& p) {
+      return Restore(arguments->other, arguments->data, lost, p);
+    };
+    const BackupFigures figures = Run(restore_it, context);
+    if (!figures.lost.empty())
+      Warn("restored without " + Listed(figures.lost) + "; upload or build them again");
   });
   restore->footer("Example:\n  kinevox restore --from /backup/kinevox --data /srv/kinevox-new");
-  for (CLI::App* one : {backup, restore}) {
-    AddQuiet(*one, context);
-    AddJson(*one, context);
-  }
+  AddQuiet(*restore, context);
+  AddJson(*restore, context);
+}
+
+}  // namespace
+
+void AddBackup(CLI::App& program, CommandContext& context) {
+  AddBackupAlone(program, context);
+  AddRestore(program, context);
 }
 
 }  // namespace kvx

@@ -3,6 +3,7 @@
 
 #include <chrono>
 
+#include "api/handlers/subjects.h"
 #include "server/log.h"
 
 namespace kvx {
@@ -53,6 +54,7 @@ void Janitor::Round(int64_t number) {
   const int removed =
       services_.blobs.RemoveUnused([this] { return services_.catalogue.BlobsInUse(); }, kBlobGrace);
   if (removed > 0) LogInfo("unused bytes removed", {{"blobs", int64_t(removed)}});
+  services_.retention.RemoveBytes([this](const std::string& model) { RemoveModelBytes(services_, model); });
 }
 
 }  // namespace kvx

@@ -1,5 +1,6 @@
-// What a service does now and then: takes jobs back from dead workers,
-// drops uploads that nobody finished and bytes that nobody refers to, counts the results of workers.
+// What a service does at its start and now and then: takes jobs back from dead workers, drops uploads that
+// nobody finished, bytes that nobody refers to and those of removed subjects that could not be removed
+// before, counts the results of workers.
 #pragma once
 #include <condition_variable>
 #include <mutex>

@@ -62,13 +62,6 @@ struct Service::State {
     return options.program.empty() ? static_cast<ScanInspector&>(in_process) : in_child;
   }
 
-  // What a subject's removal could not remove must not keep the service from starting.
-  void RemoveLeftBytes() try {
-    stores.retention.RemoveBytes([this](const std::string& model) { RemoveModelBytes(services, model); });
-  } catch (const std::exception&) {
-    LogError("bytes of removed subjects not removed", {{"error", DescribeForLog(std::current_exception())}});
-  }
-
   ServiceOptions options;
   Stores stores;
   Metrics metrics;
@@ -87,7 +80,6 @@ Service::Service(const ServiceOptions& options) : state_(std::make_unique<State>
   if (stores.data.alone()) stores.jobs.ExpireAllLeases();  // whoever held one is gone
   stores.data.LetWorkersIn();
   stores.idempotency.ForgetOlderThan(7 * kDayMs);
-  state_->RemoveLeftBytes();
   SweepArtifacts(stores.data);
 }
 

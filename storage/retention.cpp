@@ -20,8 +20,7 @@ void RemoveFile(const std::filesystem::path& path) {
   std::error_code error;
   std::filesystem::remove(path, error);
   if (error)
-    throw Unavailable(
-        "bytes of a removed subject cannot be removed now; it is tried again at the next start");
+    throw Unavailable("bytes of a removed subject cannot be removed now; it is tried again within the hour");
 }
 
 int64_t CountOf(SQLite::Database& db, std::string_view statement, const std::string& subject) {

@@ -1,6 +1,6 @@
 // Removing a subject for good: its records in one transaction with the audit entry, then the bytes. What
 // could not be removed at once (a crash in between) is remembered
-// in the database and removed at the next start.
+// in the database and removed later.
 #pragma once
 #include <atomic>
 #include <functional>

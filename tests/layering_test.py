@@ -40,7 +40,7 @@ PIPELINE_LINES = (
 LINES = {
     "core": ("errors.h farthest_place.h frames.h name.h", "host text", "numbers", "*", "voxels"),
     "kernels": ("device", "*", "reference"),
-    "storage": ("ids.h project_shares.h", "files", "database", "*"),
+    "storage": ("ids.h project_shares.h", "files", "database", "backup", "*"),
     "server": (
         "address.h http_library.h log.h metrics.h sweep_artifacts.h",
         "access turns",

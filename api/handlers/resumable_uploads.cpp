@@ -120,6 +120,14 @@ Upload OpenUpload(Services& services, const ResumableUpload& upload, std::option
   return Upload::OfScan(services, upload.subject, query, "", std::move(received));
 }
 
+// It leaves nothing; nothing is left of one whose subject was removed.
+void DropRefused(Services& services, const std::string& id) {
+  try {
+    services.resumable.Remove(id);
+  } catch (const NotFound&) {
+  }
+}
+
 }  // namespace
 
 ResumableUpload RequireResumableUpload(Services& services, const std::string& id) {
@@ -210,7 +218,7 @@ ResumableUpload ResumablePart::Finish() {
   } catch (const Error&) {
     const std::string id = writer_->upload().id;
     writer_.reset();
-    services_.resumable.Remove(id);  // a refused upload leaves nothing
+    DropRefused(services_, id);
     throw;
   }
 }

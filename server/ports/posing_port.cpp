@@ -176,7 +176,7 @@ void PipelinePoser::Forget(const std::string& model) {
   std::error_code error;
   std::filesystem::remove_all(data_.Model(model), error);
   if (error)
-    throw Unavailable("files of a removed model cannot be removed now; it is tried again at the next start");
+    throw Unavailable("files of a removed model cannot be removed now; it is tried again within the hour");
   WantSweep(data_);
 }
 

@@ -25,9 +25,15 @@ void Flush(const fs::path& path) {
   if (!FlushToDisk(path)) throw Unavailable(kNotStored);
 }
 
+[[noreturn]] void ThrowNotRead(const std::error_code& error) {
+  if (IsDenial(error))
+    throw Denied("an upload may not be read; give the user of this program the right to it");
+  throw Unavailable("an upload cannot be read back; is its disk sound?");
+}
+
 int64_t AddFile(Hasher& hasher, const fs::path& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) throw Unavailable("the upload cannot be read back");
+  if (file < 0) ThrowNotRead({errno, std::generic_category()});
   std::vector<std::byte> buffer(1 << 16);
   ssize_t count = 0;
   int64_t total = 0;
@@ -36,7 +42,7 @@ int64_t AddFile(Hasher& hasher, const fs::path& path) {
     total += count;
   }
   ::close(file);
-  if (count < 0) throw Unavailable("the upload cannot be read back");
+  if (count < 0) ThrowNotRead({errno, std::generic_category()});
   return total;
 }
 
@@ -67,13 +73,15 @@ std::vector<fs::path> FilesOf(const fs::path& folder) {
   return files;
 }
 
-Digest FolderDigest(const fs::path& folder) {
+Digest FolderDigest(const fs::path& folder) try {
   Hasher hasher;
   for (const fs::path& file : FilesOf(folder)) {
     hasher.Add(file.filename().string()).Add(int64_t(fs::file_size(file)));
     AddFile(hasher, file);
   }
   return hasher.Finish();
+} catch (const fs::filesystem_error& error) {
+  ThrowNotRead(error.code());
 }
 
 }  // namespace
@@ -81,6 +89,7 @@ Digest FolderDigest(const fs::path& folder) {
 bool IsIntact(const fs::path& blob) {
   std::error_code error;
   const fs::file_status status = fs::status(blob, error);
+  if (IsDenial(error)) ThrowNotRead(error);
   if (!fs::exists(status)) return false;
   const Digest digest = fs::is_directory(status) ? FolderDigest(blob) : FileDigest(blob);
   return digest.Hex() == blob.filename();
@@ -252,7 +261,7 @@ void BlobStore::Remove(const std::string& name) {
   fs::remove_all(PathOf(name), error);
   if (error)
     throw Unavailable(
-        "bytes of a removed subject cannot be removed now; it is tried again at the next start");
+        "bytes of a removed subject cannot be removed now; it is tried again within the hour");
 }
 
 fs::path BlobStore::PathOf(const std::string& name) const {

@@ -126,7 +126,8 @@ TEST(Resumable, WhoseSubjectIsRemovedWhileItIsSentFindsNone) {
   ResumablePart part(w.services, id, "0", "");
   part.Write(std::string_view("VOXELS"));
   DeleteSubject(w.services, w.subject, "key_a", "default");
-  EXPECT_THROW(part.Finish(), NotFound);
+  EXPECT_THAT([&] { part.Finish(); },
+              testing::ThrowsMessage<NotFound>(testing::HasSubstr("no such subject")));
   EXPECT_EQ(w.FilesUnder("blobs") + w.FilesUnder("incoming") + w.FilesUnder("uploads"), 0u);
 }
 

@@ -10,51 +10,13 @@
 #include "core/errors.h"
 #include "storage/database/sqlite.h"
 #include "storage/stores.h"
-#include "tests/support/fixtures.h"
-#include "tests/support/refusal.h"
-#include "tests/support/without_root_powers.h"
+#include "tests/support/backed_up.h"
 
 namespace kvx {
 namespace {
 
 namespace fs = std::filesystem;
-using testing_support::Content;
-
-void Write(const fs::path& file, const std::string& text) {
-  fs::create_directories(file.parent_path());
-  std::ofstream(file) << text;
-}
-
-// What the denial says.
-std::string Denial(const std::function<void()>& act) {
-  std::string told;
-  testing_support::WithoutRootPowers([&] { told = testing_support::RefusalOf<Denied>(act, "none"); });
-  return told;
-}
-
-// A data folder with one uploaded scan, and room beside it.
-class Backup : public testing::Test {
- protected:
-  Backup() {
-    Stores stores(data(), {});
-    IncomingBlob blob = stores.blobs.Receive(".nii", 1 << 20);
-    blob.Write(std::string_view("VOXELS"));
-    const std::string content = stores.blobs.Keep(std::move(blob));
-    subject = stores.catalogue.AddSubject({"Jane Roe", "knee", {}}).id;
-    stores.catalogue.AddScan(subject, "pose00", {content, content, ".nii", 6, "{}"});
-    upload = fs::path("blobs") / content.substr(0, 2) / content;
-  }
-  fs::path data() const { return scratch.path() / "data"; }
-  fs::path copy() const { return scratch.path() / "copy"; }
-  void RemoveSubject() const {
-    Stores stores(data(), {});
-    stores.retention.DeleteSubject(subject, "-", "default");
-    stores.retention.RemoveBytes([](const std::string&) {});
-  }
-  testing_support::ScratchFolder scratch;
-  std::string subject;
-  fs::path upload;
-};
+using namespace testing_support;
 
 // The records that were copied name its upload still: what they name stays until the next backup.
 TEST_F(Backup, ASubjectThatIsRemovedMeanwhileDoesNotSpoilIt) {
@@ -186,7 +148,7 @@ TEST_F(Backup, IsNotReadForAFolderThatHoldsOtherThings) {
   Write(scratch.path() / "new" / "thesis.txt", "thesis");
   int told = 0;
   const Progress counted([&](std::string_view, double) { ++told; }, {});
-  EXPECT_THROW(Restore(copy(), scratch.path() / "new", counted), InputError);
+  EXPECT_THROW(Restore(copy(), scratch.path() / "new", Lost::kRefused, counted), InputError);
   EXPECT_EQ(told, 0);
 }
 
@@ -197,13 +159,13 @@ TEST_F(Backup, IsNotReadForAPlaceThatMayNotBeWritten) {
   const fs::path locked = scratch.path() / "locked";
   fs::create_directory(locked);
   fs::permissions(locked, fs::perms::owner_read | fs::perms::owner_exec);
-  EXPECT_THAT(Denial([&] { Restore(copy(), locked / "new", counted); }),
+  EXPECT_THAT(Denial([&] { Restore(copy(), locked / "new", Lost::kRefused, counted); }),
               testing::HasSubstr("the data folder may not"));
-  EXPECT_THAT(Denial([&] { Restore(copy(), locked, counted); }),
+  EXPECT_THAT(Denial([&] { Restore(copy(), locked, Lost::kRefused, counted); }),
               testing::HasSubstr("the data folder may not"));
   Write(scratch.path() / "file", "text");
   for (const char* place : {"file", "file/new"}) {
-    EXPECT_THROW(Restore(copy(), scratch.path() / place, counted), InputError) << place;
+    EXPECT_THROW(Restore(copy(), scratch.path() / place, Lost::kRefused, counted), InputError) << place;
     EXPECT_THROW(BackUp(data(), scratch.path() / place), InputError) << place;
   }
   EXPECT_EQ(told, 0);
@@ -229,7 +191,7 @@ TEST_F(Backup, WhatIsRestoredIsAsOfOneMomentOrRefused) {
         },
         {});
   };
-  Restore(data(), scratch.path() / "new", while_copying([&] {
+  Restore(data(), scratch.path() / "new", Lost::kRefused, while_copying([&] {
             Stores stores(data(), {});
             IncomingBlob blob = stores.blobs.Receive(".nii", 100);
             blob.Write(std::string_view("LATER"));
@@ -238,8 +200,9 @@ TEST_F(Backup, WhatIsRestoredIsAsOfOneMomentOrRefused) {
           }));
   EXPECT_TRUE(done);
   EXPECT_NO_THROW(BackUp(scratch.path() / "new", copy())) << "all that its records name is there";
-  EXPECT_THROW(Restore(data(), scratch.path() / "newer", while_copying([&] { RemoveSubject(); })),
-               Unavailable);
+  EXPECT_THROW(
+      Restore(data(), scratch.path() / "newer", Lost::kRefused, while_copying([&] { RemoveSubject(); })),
+      Unavailable);
   EXPECT_FALSE(fs::exists(scratch.path() / "newer" / kDatabaseFile));
 }
 
@@ -252,26 +215,6 @@ TEST_F(Backup, OfBeforeTheMarkIsBroughtUpToDate) {
 }
 
 // A series is a folder: its name tells of all its files.
-TEST_F(Backup, ASeriesWithADamagedOrAMissingFileIsNotRestored) {
-  fs::path series;
-  {
-    Stores stores(data(), {});
-    IncomingFolder folder = stores.blobs.ReceiveFolder();
-    for (const char* name : {"0001.dcm", "0002.dcm"}) Write(folder.path() / name, "SLICE");
-    const std::string content = stores.blobs.KeepFolder(std::move(folder));
-    stores.catalogue.AddScan(subject, "pose01", {content, content, ".zip", 10, "{}"});
-    series = fs::path("blobs") / content.substr(0, 2) / content;
-  }
-  BackUp(data(), copy());
-  const fs::path slice = copy() / series / "0002.dcm";
-  Write(slice, "SLICX");
-  EXPECT_THROW(Restore(copy(), scratch.path() / "new"), InputError);
-  fs::remove(slice);
-  EXPECT_THROW(Restore(copy(), scratch.path() / "new"), InputError);
-  EXPECT_EQ(BackUp(data(), copy()).files, 1) << "what went is copied again";
-  EXPECT_NO_THROW(Restore(copy(), scratch.path() / "new"));
-}
-
 // What it holds beside the tables that this program knows would be left out, or left behind.
 TEST_F(Backup, OfANewerProgramIsNeitherMadeNorRestored) {
   const auto age = [](const fs::path& folder) {
@@ -292,55 +235,6 @@ TEST_F(Backup, ASeriesThatNoRecordNamesAnyLongerIsNotAskedFor) {
   BackUp(data(), copy());
   fs::create_directories(copy() / "blobs" / "ab" / std::string(64, 'a'));
   EXPECT_NO_THROW(Restore(copy(), scratch.path() / "new"));
-}
-
-TEST_F(Backup, AFileThatIsCutOffIsCopiedAnew) {
-  BackUp(data(), copy());
-  std::ofstream(copy() / upload) << "VOX";
-  EXPECT_THROW(Restore(copy(), scratch.path() / "new"), InputError);
-  BackUp(data(), copy());
-  EXPECT_EQ(Content(copy() / upload), "VOXELS");
-}
-
-TEST_F(Backup, OtherBytesOfTheSameSizeAreFoundByACheck) {
-  BackUp(data(), copy());
-  std::ofstream(copy() / upload) << "VOXELX";
-  BackUp(data(), copy());
-  EXPECT_EQ(Content(copy() / upload), "VOXELX");
-  EXPECT_EQ(BackUp(data(), copy(), CopiedBefore::kChecked).files, 1);
-  EXPECT_EQ(Content(copy() / upload), "VOXELS");
-}
-
-TEST_F(Backup, ADamagedUploadDoesNotReplaceItsGoodCopy) {
-  BackUp(data(), copy());
-  for (const char* damaged : {"VOX", "VOXELX"}) {
-    std::ofstream(data() / upload) << damaged;
-    BackUp(data(), copy(), CopiedBefore::kChecked);
-    EXPECT_EQ(Content(copy() / upload), "VOXELS") << damaged;
-  }
-}
-
-TEST_F(Backup, WhichSideFailedIsTold) {
-  const auto back_up = [&] { BackUp(data(), copy()); };
-  const fs::path blob = data() / upload;
-  for (const fs::path& closed : {blob, blob.parent_path()}) {
-    fs::permissions(closed, fs::perms::none);
-    EXPECT_THAT(Denial(back_up), testing::HasSubstr("what is copied cannot be read"));
-    fs::permissions(closed, fs::perms::owner_all);
-  }
-  fs::create_directories(copy() / upload.parent_path());
-  Write(copy() / "kinevox-backup", "");
-  fs::permissions(copy() / upload.parent_path(), fs::perms::owner_read | fs::perms::owner_exec);
-  EXPECT_THAT(Denial(back_up), testing::HasSubstr("copy cannot be written"));
-  fs::permissions(copy() / upload.parent_path(), fs::perms::owner_all);
-  back_up();
-}
-
-TEST_F(Backup, ACopyThatCannotBeReadIsMadeAnew) {
-  BackUp(data(), copy());
-  fs::permissions(copy() / upload, fs::perms::none);
-  EXPECT_EQ(Denial([&] { EXPECT_EQ(BackUp(data(), copy(), CopiedBefore::kChecked).files, 1); }), "none");
-  EXPECT_EQ(Content(copy() / upload), "VOXELS");
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -103,6 +105,17 @@ Volume ShownAsScan(Volume volume, const Landings& landings) {
 // Of the scan, whose greys are magnitudes, beside the template `seen`, by what both show where the start puts
 // the body. `place(v)`: where a voxel lies on `grid`.
 template <class Place>
+std::vector<ShadingSample> SamplesOf(const Grid& grid, const LevelImages& images, const Volume& seen,
+                                 const Landings& landings, Place place) {
+  std::vector<ShadingSample> samples;
+  const size_t stride = StrideOf(seen.grid, kEnoughForShading, kLeastShadingStride);
+  for (size_t v = 0; v < seen.values.size(); v += stride) {
+    const std::optional<double> s = images.body.values[v] ? landings(v) : std::nullopt;
+    if (s) samples.push_back({grid.ToMm(place(v)).lps, seen.values[v], *s});
+  }
+  return samples;
+}
+template <class Place>
 std::optional<Shading> ShadingOf(const Grid& grid, const LevelImages& images, const Volume& seen,
                                  const Landings& landings, Place place) {
   if (!IsMagnitude(seen)) return std::nullopt;
@@ -144,6 +157,14 @@ Pair InOneLight(const LevelImages& images, ShownPair& shown, const BlockLevel& l
   show();
   if (!IsMagnitude(images.scan)) return out;
   const auto in_scan = [&](size_t v) { return PointVox{level.start[v].head<3>().cast<double>()}; };
+  const char* mode = std::getenv("KVX_A");
+  if (!out.contrast && mode) {
+    const double a = ScanOrigin(SamplesOf(images.scan.grid, images, out.seen, out.landings, in_scan));
+    if (std::getenv("KVX_SAY")) std::fprintf(stderr, "origin %.2f\n", a);
+    out.raw = FromOrigin(std::move(out.raw), float(a));
+    out.scan = FromOrigin(std::move(out.scan), float(a));
+    out.landings = Landings(out.scan, level);
+  }
   if (const auto coil = ShadingOf(images.scan.grid, images, out.seen, out.landings, in_scan)) {
     const Volume on_raw = coil->On(out.raw.grid);
     Divide(out.raw, on_raw);

@@ -24,4 +24,6 @@ struct ShadingSample {
 // nothing where too few are left.
 std::optional<Shading> FitShading(std::span<const ShadingSample> samples);
 
+double ScanOrigin(std::span<const ShadingSample> samples);
+
 }  // namespace kvx

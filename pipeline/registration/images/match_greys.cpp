@@ -14,6 +14,7 @@
 #include "pipeline/registration/images/grey_origin.h"
 #include "pipeline/registration/images/grey_table.h"
 #include "pipeline/registration/images/noise.h"
+#include "pipeline/registration/images/scan_origin.h"
 #include "pipeline/registration/images/shading.h"
 #include "pipeline/registration/images/start_residual.h"
 #include "pipeline/registration/images/usual_residual.h"
@@ -102,30 +103,20 @@ Volume ShownAsScan(Volume volume, const Landings& landings) {
   return volume;
 }
 
-// Of the scan, whose greys are magnitudes, beside the template `seen`, by what both show where the start puts
-// the body. `place(v)`: where a voxel lies on `grid`.
+// Of what both show where the start puts the body: of the scan, whose greys are magnitudes, beside the
+// template `seen`. `place(v)`: where a voxel lies on `grid`. None where the template's greys are no
+// magnitudes.
 template <class Place>
 std::vector<ShadingSample> SamplesOf(const Grid& grid, const LevelImages& images, const Volume& seen,
-                                 const Landings& landings, Place place) {
+                                     const Landings& landings, Place place) {
   std::vector<ShadingSample> samples;
+  if (!IsMagnitude(seen)) return samples;
   const size_t stride = StrideOf(seen.grid, kEnoughForShading, kLeastShadingStride);
   for (size_t v = 0; v < seen.values.size(); v += stride) {
     const std::optional<double> s = images.body.values[v] ? landings(v) : std::nullopt;
     if (s) samples.push_back({grid.ToMm(place(v)).lps, seen.values[v], *s});
   }
   return samples;
-}
-template <class Place>
-std::optional<Shading> ShadingOf(const Grid& grid, const LevelImages& images, const Volume& seen,
-                                 const Landings& landings, Place place) {
-  if (!IsMagnitude(seen)) return std::nullopt;
-  std::vector<ShadingSample> samples;
-  const size_t stride = StrideOf(seen.grid, kEnoughForShading, kLeastShadingStride);
-  for (size_t v = 0; v < seen.values.size(); v += stride) {
-    const std::optional<double> s = images.body.values[v] ? landings(v) : std::nullopt;
-    if (s) samples.push_back({grid.ToMm(place(v)).lps, seen.values[v], *s});
-  }
-  return FitShading(samples);
 }
 
 void Divide(Volume& volume, const Volume& by) {
@@ -157,23 +148,19 @@ Pair InOneLight(const LevelImages& images, ShownPair& shown, const BlockLevel& l
   show();
   if (!IsMagnitude(images.scan)) return out;
   const auto in_scan = [&](size_t v) { return PointVox{level.start[v].head<3>().cast<double>()}; };
-  const char* mode = std::getenv("KVX_A");
-  if (!out.contrast && mode) {
-    const double a = ScanOrigin(SamplesOf(images.scan.grid, images, out.seen, out.landings, in_scan));
-    if (std::getenv("KVX_SAY")) std::fprintf(stderr, "origin %.2f\n", a);
-    out.raw = FromOrigin(std::move(out.raw), float(a));
-    out.scan = FromOrigin(std::move(out.scan), float(a));
-    out.landings = Landings(out.scan, level);
-  }
-  if (const auto coil = ShadingOf(images.scan.grid, images, out.seen, out.landings, in_scan)) {
+  std::vector<ShadingSample> samples = SamplesOf(images.scan.grid, images, out.seen, out.landings, in_scan);
+  const float origin = out.contrast ? 0 : float(FitScanOrigin(samples));
+  for (ShadingSample& sample : samples) sample.scan_value -= origin;
+  if (const auto coil = FitShading(samples)) {
     const Volume on_raw = coil->On(out.raw.grid);
+    out.raw = FromOrigin(std::move(out.raw), origin), out.scan = FromOrigin(std::move(out.scan), origin);
     Divide(out.raw, on_raw);
     Divide(out.scan, out.scan.grid == out.raw.grid ? on_raw : coil->On(out.scan.grid));
     out.landings = Landings(out.scan, level);
     show();
   }
   const auto in_template = [&](size_t v) { return PointVox{level.grid.Ijk(v).cast<double>()}; };
-  if (const auto left = ShadingOf(level.grid, images, out.seen, out.landings, in_template))
+  if (const auto left = FitShading(SamplesOf(level.grid, images, out.seen, out.landings, in_template)))
     Multiply(out.seen, left->On(level.grid));
   return out;
 }

@@ -82,6 +82,14 @@ TEST(RegisterScan, TissueInTheShadowOfACoilIsFoundInGreysThatAToolHasShifted) {
   }
 }
 
+// What is as dark as the darkest muscle is black, as a display's window leaves it.
+TEST(RegisterScan, TissueIsFoundInAWindowOfADisplay) {
+  Scan scan = BumpedInTheShadowOfACoil();
+  for (float& value : scan.volume.values) value = std::max(0.0f, value - 55);
+  const RegisteredScan result = Register(Render(LimbGrid(), Identity, 1), scan);
+  EXPECT_LT(Compare(result, Bump, kSpacing).mean_mm, 0.25 * kSpacing);
+}
+
 // Dark tissue bright and bright bone dark, air as before: no gain and bias can say that.
 TEST(RegisterScan, FollowsAnotherContrast) {
   Scan scan = Render(LimbGrid(), TemplateFromBumped, 2);

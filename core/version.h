@@ -3,6 +3,6 @@
 
 namespace kvx {
 
-const char* ProgramVersion();  // "0.101.0"
+const char* ProgramVersion();  // "0.102.0"
 
 }  // namespace kvx

@@ -10,6 +10,7 @@ namespace kvx {
 namespace {
 using namespace testing_support;
 
+// A series is a folder: its name tells of all its files.
 class BackupOfASeries : public Backup {
  protected:
   BackupOfASeries() {

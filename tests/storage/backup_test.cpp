@@ -214,7 +214,6 @@ TEST_F(Backup, OfBeforeTheMarkIsBroughtUpToDate) {
   EXPECT_FALSE(fs::exists(copy() / upload));
 }
 
-// A series is a folder: its name tells of all its files.
 // What it holds beside the tables that this program knows would be left out, or left behind.
 TEST_F(Backup, OfANewerProgramIsNeitherMadeNorRestored) {
   const auto age = [](const fs::path& folder) {

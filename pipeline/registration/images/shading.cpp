@@ -4,8 +4,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 
 #include "core/host/parallel.h"
 #include "core/numbers/quantile.h"
@@ -90,56 +88,7 @@ Shading BoxOf(std::span<const ShadingSample> samples) {
   return out;
 }
 
-// Spread of log greys over those above the dark, both cut alike.
-double ExcessSpread(const std::vector<ShadingSample>& samples, const std::vector<double>& shade,
-                    const std::vector<double>& weight, double a, double mean_t, double mean_s) {
-  double n = 0, t1 = 0, t2 = 0, s1 = 0, s2 = 0;
-  for (size_t i = 0; i < samples.size(); ++i) {
-    const double t = samples[i].template_value, s = (samples[i].scan_value - a) / shade[i];
-    if (weight[i] <= 0 || !(t > kDark * mean_t && s > kDark * mean_s)) continue;
-    const double lt = std::log(t / mean_t), ls = std::log(s / mean_s), w = weight[i];
-    n += w, t1 += w * lt, t2 += w * lt * lt, s1 += w * ls, s2 += w * ls * ls;
-  }
-  if (n <= 0) return 0;
-  return std::sqrt(std::max(0.0, s2 / n - s1 * s1 / n / n)) - std::sqrt(std::max(0.0, t2 / n - t1 * t1 / n / n));
-}
-
 }  // namespace
-
-double ScanOrigin(std::span<const ShadingSample> given) {
-  std::vector<ShadingSample> samples(given.begin(), given.end());
-  if (samples.size() < kLeastSamples) return 0;
-  double mean_t = 0, mean_s = 0;
-  for (const ShadingSample& x : samples) mean_t += x.template_value, mean_s += x.scan_value;
-  mean_t /= double(samples.size()), mean_s /= double(samples.size());
-  if (!(mean_t > 0 && mean_s > 0)) return 0;
-  double a = 0;
-  for (int round = 0; round < 5; ++round) {
-    std::vector<ShadingSample> shifted = samples;
-    for (ShadingSample& x : shifted) x.scan_value -= a;
-    const auto coil = FitShading(shifted);
-    if (!coil) return 0;
-    std::vector<double> shade(samples.size()), weight(samples.size());
-    const Shading box = BoxOf(samples);
-    const double spread = RobustSpread(Rows(shifted, box), coil->coefficients);
-    ParallelEach(samples.size(), [&](size_t i) {
-      shade[i] = coil->At(samples[i].x_mm);
-      const double r = std::log(std::max(1e-9, shifted[i].scan_value / shade[i] / std::max(1e-9, samples[i].template_value)));
-      const double off = r / (3 * kReach * spread);
-      weight[i] = std::abs(off) < 1 ? (1 - off * off) * (1 - off * off) : 0;
-      if (samples[i].template_value <= 0 || shifted[i].scan_value <= 0) weight[i] = 0;
-    });
-    double lo = -1.5 * mean_s, hi = 0.6 * mean_s;
-    for (int n = 0; n < 30; ++n) {
-      const double mid = (lo + hi) / 2;
-      (ExcessSpread(samples, shade, weight, mid, mean_t, mean_t * 1.0) > 0 ? hi : lo) = mid;
-    }
-    const double next = (lo + hi) / 2;
-    if (std::getenv("KVX_SAY")) std::fprintf(stderr, "origin round %d: %.2f of mean %.1f spread %.3f\n", round, next, mean_s, spread);
-    a = 0.5 * a + 0.5 * next;
-  }
-  return a;
-}
 
 double Shading::At(const Eigen::Vector3d& x_mm) const {
   return std::exp(TermsAt(InBox(*this, x_mm)).dot(coefficients));

@@ -24,6 +24,4 @@ struct ShadingSample {
 // nothing where too few are left.
 std::optional<Shading> FitShading(std::span<const ShadingSample> samples);
 
-double ScanOrigin(std::span<const ShadingSample> samples);
-
 }  // namespace kvx
